@@ -5,7 +5,7 @@
 
 namespace gewebe {
 
-/// Sides count; false where a side is NaN.
+/// Boxes are closed; false if a coordinate is NaN.
 inline bool meet(const Box3& a, const Box3& b) {
   for (int axis = 0; axis < 3; ++axis)
     if (!(a.min[axis] <= b.max[axis] && b.min[axis] <= a.max[axis]))

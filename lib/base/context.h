@@ -1,6 +1,5 @@
 #pragma once
-// What a caller tells every long computation: how many threads, whom to tell of progress, when to
-// stop, how much memory.
+// Context of a long computation: number of threads, progress, cancellation, limit of memory.
 
 #include "base/cpu.h"
 
@@ -10,12 +9,12 @@
 namespace gewebe {
 
 struct Context {
-  int threads = 0; ///< 0: all that the machine has
+  int threads = 0; ///< 0: all of the machine
   std::function<void(double)>
-      progress; ///< told the done fraction 0…1, from any thread, never concurrently
-  std::function<bool()> cancelled; ///< asked between blocks; true ends the call with Cancelled
+      progress; ///< called with the done fraction 0…1, from any thread, never concurrently
+  std::function<bool()> cancelled; ///< called between blocks; true ends the call with Cancelled
   std::uint64_t max_memory = UINT64_MAX; ///< bytes; an estimate beyond it is refused
-  CpuLevel cpu = best_cpu_level();       ///< kernels to use, at most what the machine can do
+  CpuLevel cpu = best_cpu_level();       ///< kernels to use, at most the machine's level
 };
 
 /// \throw Error "needs 12.3 GiB, --max-memory is 4.0 GiB" when `bytes` exceeds the context's limit.

@@ -1,14 +1,14 @@
 #pragma once
-// A value that its copies share until one of them is written.
+// Copy-on-write value: copies share it until one of them is written.
 
 #include <memory>
 #include <utility>
 
 namespace gewebe {
 
-/// Copying costs a reference. Different copies may be used by different threads, but not written
-/// while another thread makes or drops a copy of the same one. A moved-from one may only be
-/// assigned to or destroyed.
+/// A copy costs a reference count. Different threads may use different copies, but must not write
+/// one while another thread makes or drops a copy of it. A moved-from value may only be assigned to
+/// or destroyed.
 template <class T>
 class CopyOnWrite {
 public:
@@ -17,13 +17,13 @@ public:
 
   const T& operator*() const noexcept { return *held_; }
   const T* operator->() const noexcept { return held_.get(); }
-  /// This copy alone has it from now on.
+  /// Reference to a value that only this copy has from now on.
   T& write() {
     if (held_.use_count() != 1)
       held_ = std::make_shared<T>(*held_);
     return *held_;
   }
-  /// As write, for who overwrites all of it: what it holds is anything.
+  /// As write, to overwrite the whole value: its present content is unspecified.
   T& replace() {
     if (held_.use_count() != 1)
       held_ = std::make_shared<T>();

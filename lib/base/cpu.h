@@ -1,5 +1,5 @@
 #pragma once
-// Which instruction sets the kernels may use. Every level gives the same bytes.
+// Instruction sets that kernels may use. Results are the same bytes at every level.
 
 #include <string_view>
 

@@ -24,7 +24,7 @@ constexpr Tables make_tables() {
       crc = crc >> 1 ^ ((crc & 1) != 0 ? polynomial : 0);
     tables[0][byte] = crc;
   }
-  // Table t tells what a byte does when t further bytes have passed.
+  // Table t has the effect of a byte after t further bytes.
   for (std::size_t t = 1; t < word; ++t)
     for (std::size_t byte = 0; byte < 256; ++byte)
       tables[t][byte] = tables[t - 1][byte] >> 8 ^ tables[0][tables[t - 1][byte] & 0xff];

@@ -1,5 +1,5 @@
 #pragma once
-// What goes wrong, and where. The library throws Error; a tool prints it as exactly one line,
+// Errors with their place. The library throws Error; a tool prints it as exactly one line,
 // `tool: PLACE: what is wrong, what was expected`, and ends with status 1.
 
 #include <stdexcept>
@@ -8,9 +8,9 @@
 
 namespace gewebe {
 
-/// A failure that the user can understand. `what()` is the complaint alone ("3 odd rays, expected a
-/// closed mesh"), `place()` says where it was found ("liver.obj:12", "-: byte 37") and may be
-/// empty: the library knows no files, so formats and tools add the place (see `at`).
+/// Error with a message for the user. `what()` is the message without its place ("3 odd rays,
+/// expected a closed mesh"). `place()` is the position in a file ("liver.obj:12", "-: byte 37") or
+/// empty. The library does not use files, so formats and tools add the place (see `at`).
 class Error : public std::runtime_error {
 public:
   explicit Error(const std::string& what) : std::runtime_error(what) {}
@@ -29,7 +29,7 @@ public:
   using Error::Error;
 };
 
-/// Thrown by library calls when their cancel callback answered true.
+/// Thrown by library calls when their cancel callback returned true.
 class Cancelled : public Error {
 public:
   Cancelled() : Error("cancelled") {}

@@ -1,6 +1,6 @@
 #pragma once
-// Signs of orientation determinants, never wrong: a double filter first, floating-point expansions
-// on the stack where the filter cannot tell.
+// Exact signs of orientation determinants: first a filter in double precision, then, if the filter
+// can't decide, floating-point expansions on the stack.
 
 #include "base/vec3.h"
 
@@ -8,18 +8,18 @@
 
 namespace gewebe {
 
-/// Coordinates that the predicates take are 0 or have a magnitude in [smallest, largest]: within it
-/// no partial product can underflow or overflow.
+/// Coordinates of the predicates must be 0 or have a magnitude in [smallest, largest]: no partial
+/// product can then underflow or overflow.
 inline constexpr double predicate_smallest = 0x1p-200;
 inline constexpr double predicate_largest = 0x1p40;
 
-/// `x`, or 0 where it is too small for the predicates.
+/// `x`, or 0 if it is too small for the predicates.
 inline double predicate_coordinate(double x) {
   return x < predicate_smallest && x > -predicate_smallest ? 0.0 : x;
 }
 
 /// Sign (-1, 0, 1) of (bx-ax)(cy-ay) - (by-ay)(cx-ax): 1 if a, b, c turn left. Adds 1 to
-/// `exact_tests` where the filter could not tell. \pre coordinates as above
+/// `exact_tests` if the filter can't decide. \pre coordinates as above
 int turn_sign(double ax, double ay, double bx, double by, double cx, double cy,
               std::uint64_t& exact_tests);
 

@@ -1,6 +1,6 @@
 #pragma once
-// Four numbers at a time, for kernels that are compiled once for each instruction set: each unit
-// has its own code. A vector would be returned by another rule on each level; so none is returned.
+// SIMD vectors of four numbers, for kernels that are compiled once for each instruction set. The
+// calling convention for returned vectors differs between the sets, so no function returns one.
 
 namespace gewebe {
 namespace {

@@ -1,6 +1,6 @@
 #pragma once
-// A hash map from lattice indices to numbers: flat, linear probing, no removal. Its answers don't
-// depend on the order of insertion.
+// Hash map from lattice indices to numbers: flat, linear probing, no removal. Results of look-ups
+// do not depend on the order of insertion.
 
 #include "base/vec3.h"
 

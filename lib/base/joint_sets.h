@@ -31,13 +31,14 @@ public:
       if (a == b)
         return;
       std::uint32_t child = std::max(a, b);
-      // Only a root may be hung below another; if it no longer is one, its new root is looked for.
+      // Only a root may be attached to another. If it is no root any more, its new root is
+      // searched.
       if (std::atomic_ref(parent_[child])
               .compare_exchange_strong(child, std::min(a, b), std::memory_order_relaxed))
         return;
     }
   }
-  /// Makes all that is joined so far quick to find.
+  /// Compresses all paths, so that later look-ups are fast.
   void flatten(const Context& context) {
     Context quiet = context;
     quiet.progress = nullptr;
@@ -57,8 +58,8 @@ private:
   std::uint32_t parent(std::uint32_t n) {
     return std::atomic_ref(parent_[n]).load(std::memory_order_relaxed);
   }
-  /// A parent is below its child, so that what a thread writes here is right whatever others do:
-  /// once above an item, always above it.
+  /// A parent has a smaller number than its child. An ancestor of an item stays its ancestor, so
+  /// that concurrent writes of other threads can't make a write here wrong.
   std::uint32_t find(std::uint32_t n) {
     for (;;) {
       const std::uint32_t next = parent(n);

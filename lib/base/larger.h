@@ -1,13 +1,13 @@
 #pragma once
-// The larger and the smaller of two numbers, where std::max, std::fmax and `x > worst` drop a NaN
-// and whoever compares with a bound would not see it.
+// Maximum and minimum of two numbers that propagate NaN. std::max, std::fmax and `x > worst` drop a
+// NaN, so that a later comparison with a bound would miss it.
 
 #include <cmath>
 #include <type_traits>
 
 namespace gewebe {
 
-/// What is no floating-point number is never one.
+/// Whether x is NaN; false for types without NaN.
 template <class T>
 bool is_nan(T x) {
   if constexpr (std::is_floating_point_v<T>)

@@ -1,6 +1,6 @@
 #pragma once
-// A few threads that do many short steps together: they meet after each one, which costs under a
-// microsecond where a parallel loop would cost several.
+// Spin barrier for a few threads that do many short steps together. A wait at the barrier after
+// each step costs less than a microsecond; a parallel loop would cost several.
 
 #include <atomic>
 #include <cstdint>
@@ -8,13 +8,13 @@
 
 namespace gewebe {
 
-/// Where threads wait for each other: with patience where another program has the core.
+/// Barrier at which threads wait for each other. They yield the core if another program needs it.
 class MeetingPoint {
 public:
   explicit MeetingPoint(int threads) : threads_(threads) {}
 
-  /// Returns when all have called it; what they wrote before is seen by all. \param round the
-  /// caller's own count of meetings, 0 at first
+  /// Returns when all threads have called it. Their earlier writes are then visible to all.
+  /// \param round  the caller's own count of calls, 0 at first
   void meet(std::uint32_t& round) noexcept;
 
 private:
@@ -23,8 +23,8 @@ private:
   std::atomic<std::uint32_t> round_{0};
 };
 
-/// Calls work(thread, threads, point) on up to `threads` threads at once, fewer where the system
-/// has no more of them. \pre work does not throw, and all meet equally often
+/// Calls work(thread, threads, point) on up to `threads` threads at once, or fewer if the system
+/// grants fewer. \pre work does not throw, and all threads wait at the barrier equally often
 void in_lockstep(int threads,
                  const std::function<void(int thread, int threads, MeetingPoint& point)>& work);
 

@@ -1,5 +1,5 @@
 #pragma once
-// What a mistyped word may have meant.
+// Suggestions for mistyped words.
 
 #include <span>
 #include <string>
@@ -7,10 +7,10 @@
 
 namespace gewebe {
 
-/// The word of `known` that is nearest to `word`: the fewest letters to insert, take away, replace
-/// or swap with their neighbour (optimal string alignment), at most one in three of the longer
-/// word's; or the one that `word` begins, three letters at least. Of equals the first. "" if none
-/// is near.
+/// The word of `known` that is nearest to `word`. The distance is the number of letters to insert,
+/// remove, replace or swap with their neighbour (optimal string alignment). It may be at most a
+/// third of the letters of the longer word. A word that starts with `word` is near too, if `word`
+/// has at least three letters. Ties go to the first word. "" if no word is near.
 std::string nearest_word(std::string_view word, std::span<const std::string> known);
 
 /// " (did you mean WORD?)", or nothing.

@@ -1,5 +1,5 @@
 #pragma once
-// Numbers as our text formats hold them.
+// Numbers as text, as in Gewebe's text formats.
 
 #include <array>
 #include <charconv>
@@ -31,9 +31,8 @@ inline double decimal_of(float value) {
   return result;
 }
 
-/// What std::from_chars, which knows no plus sign, is to read of a word: "+1" is a number, "+-1"
-/// and
-/// "++1" are none.
+/// The word without a leading plus sign, which std::from_chars does not accept: "+1" is a number,
+/// "+-1" and "++1" are none.
 constexpr std::string_view without_plus(std::string_view word) {
   return word.size() > 1 && word[0] == '+' && word[1] != '-' ? word.substr(1) : word;
 }

@@ -22,7 +22,7 @@ namespace gewebe {
 
 namespace {
 
-/// How many of `wanted` threads live at once beside this one.
+/// Number of threads that the system grants beside this one, at most the given number.
 int threads_to_be_had(int wanted) {
   std::mutex mutex;
   std::condition_variable ready;
@@ -48,8 +48,8 @@ int threads_to_be_had(int wanted) {
   return static_cast<int>(others.size());
 }
 
-/// TBB ends the program when a thread that it may have is refused, so it is told before how many
-/// there are; OpenVDB's own loops keep to it, too.
+/// TBB ends the program if the system refuses a thread within TBB's limit. The limit is therefore
+/// set to the number of available threads. It holds for OpenVDB's own loops too.
 int arena_threads(int wanted) {
   static const int available = [] {
     const int cores = oneapi::tbb::info::default_concurrency();

@@ -1,6 +1,7 @@
 #pragma once
-// Parallel loops whose result doesn't depend on the number of threads: blocks are cut by `grain`
-// alone, each block writes its own slots, and whoever needs a sum adds the slots in order
+// Parallel loops whose result does not depend on the number of threads: `grain` alone determines
+// the blocks, each block writes its own slots, and a caller that needs a sum adds the slots in
+// order
 // afterwards.
 
 #include "base/context.h"
@@ -11,19 +12,20 @@
 namespace gewebe {
 
 /// Calls `body(begin, end)` for consecutive blocks [0,grain), [grain,2 grain), … of [0,count), at
-/// most context.threads at a time or what the system gives. Reports progress, honours cancelling.
+/// most context.threads at a time, or fewer if the system grants fewer threads. Reports progress
+/// and checks for cancellation.
 /// \pre grain > 0; body touches nothing that another block writes.
 /// \throw what the body throws (one of them), Cancelled
 void parallel_blocks(const Context& context, std::size_t count, std::size_t grain,
                      const std::function<void(std::size_t begin, std::size_t end)>& body);
 
-/// The same blocks: as above where they are `worth` it, else one behind the other on this thread.
-/// To wake other threads and wait for them takes some 10 us on a quiet machine and the slice of its
-/// scheduler on one that has other work, so that what takes less than some 200 us is quicker alone.
+/// The same blocks: in parallel if `worth`, else one after the other on this thread. To wake other
+/// threads and to wait for them takes about 10 us on an idle machine, and a scheduler's time slice
+/// on a busy one. Work of less than about 200 us is therefore faster on one thread.
 void parallel_blocks_if(bool worth, const Context& context, std::size_t count, std::size_t grain,
                         const std::function<void(std::size_t begin, std::size_t end)>& body);
 
-/// Threads that a context stands for: context.threads, or the machine's where that is 0.
+/// Number of threads of a context: context.threads, or that of the machine if it is 0.
 int thread_count(const Context& context) noexcept;
 
 } // namespace gewebe

@@ -1,5 +1,5 @@
 #pragma once
-// A direction across another one.
+// Direction perpendicular to another one.
 
 #include "base/vec3.h"
 

@@ -1,5 +1,5 @@
 #pragma once
-// Numbers for who reads a message.
+// Rounded numbers for messages.
 
 #include "base/number_text.h"
 
@@ -9,7 +9,7 @@
 
 namespace gewebe {
 
-/// Three digits.
+/// The number with three significant digits.
 inline std::string rounded_text(double value) {
   std::array<char, 32> text{};
   const auto end =

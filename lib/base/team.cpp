@@ -98,7 +98,8 @@ void lead_team(const Context& context, const std::function<void(Team&)>& work) {
   }
   team.alone_ = false;
   std::atomic<bool> led = false;
-  // Who comes first leads, so that nobody waits for a leader that is still to come.
+  // The first thread to arrive leads, so that no thread waits for a leader that has not started
+  // yet.
   Context quiet = context;
   quiet.progress = nullptr;
   parallel_blocks(quiet, threads, 1, [&](std::size_t, std::size_t) {

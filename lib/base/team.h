@@ -1,8 +1,8 @@
 #pragma once
-// Threads that stay awake for many short loops one behind the other, such as those over the fronts
-// on the way to the root of an elimination tree. A loop begins within less than a microsecond,
-// where parallel_blocks() wakes threads for each one; and who has come late, or has lost its
-// processor, is not waited for, but for the blocks that it has taken.
+// Team of threads that stay awake for many short successive loops, such as those over the fronts
+// near the root of an elimination tree. A loop begins within less than a microsecond, while
+// parallel_blocks() wakes threads for each loop. A thread that is late, or has lost its processor,
+// delays only the blocks that it has taken.
 
 #include "base/context.h"
 
@@ -15,11 +15,12 @@
 
 namespace gewebe {
 
+/// Team of lead_team(), which owns it.
 class Team {
 public:
   using Body = std::function<void(std::size_t begin, std::size_t end)>;
 
-  /// Of the calling thread alone.
+  /// Creates a team of the calling thread alone.
   Team() = default;
   Team(const Team&) = delete;
   Team& operator=(const Team&) = delete;
@@ -38,11 +39,11 @@ private:
   void help();
   void run(const Body& body, std::size_t begin, std::size_t end);
 
-  static constexpr std::size_t line = 64; // of the cache: who waits reads one, who works another
+  static constexpr std::size_t line = 64; // of the cache: waiting and working use different lines
 
   bool alone_ = true;
-  /// The loop's number, times 2^32, and how many of its blocks nobody has taken. What a thread has
-  /// read of a loop is of that loop if it gets to take one off.
+  /// Number of the loop times 2^32, plus the number of its blocks that are not taken yet. If a
+  /// thread succeeds in decrementing it, then the data that it has read belongs to that loop.
   alignas(line) std::atomic<std::uint64_t> open_ = 0;
   std::atomic<const Body*> body_ = nullptr;
   std::atomic<std::size_t> count_ = 0, grain_ = 1;
@@ -52,8 +53,8 @@ private:
   std::exception_ptr failure_;
 };
 
-/// Calls `work` once, with a team of the context's threads or what the system gives. Others of the
-/// team wait awake until the work ends.
+/// Calls `work` once, with a team of the context's threads, or fewer if the system grants fewer.
+/// The other threads of the team wait awake until the work ends.
 /// \throw what work throws, Cancelled
 void lead_team(const Context& context, const std::function<void(Team&)>& work);
 

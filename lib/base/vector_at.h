@@ -1,5 +1,5 @@
 #pragma once
-// Three numbers a node, one vector.
+// Vectors of nodes in arrays with three numbers per node.
 
 #include "base/vec3.h"
 
@@ -11,17 +11,17 @@
 
 namespace gewebe {
 
-/// The vector of a node where x, y and z of node 0, of node 1, ... stand in a row.
+/// The vector of a node in an array of x, y and z of node 0, of node 1, ...
 inline Vec3 vector_at(std::span<const double> values, std::size_t node) {
   return {values[3 * node], values[3 * node + 1], values[3 * node + 2]};
 }
 
-/// Where an axis of a node stands in such a row.
+/// Index of an axis of a node in such an array.
 inline std::size_t axis_of(std::uint32_t node, int axis) {
   return 3 * std::size_t{node} + static_cast<std::size_t>(axis);
 }
 
-/// The largest of the absolute values, NaN if one is; 0 of none.
+/// The largest absolute value; NaN if one is NaN; 0 for an empty array.
 inline double largest_size(std::span<const double> values) {
   double size = 0;
   for (const double value : values)

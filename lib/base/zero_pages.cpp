@@ -20,7 +20,7 @@ ZeroPages::ZeroPages(std::size_t bytes) : bytes_(up_to(bytes, page)) {
     return;
   if (bytes > SIZE_MAX / 2)
     throw std::bad_alloc();
-  // A huge page must begin at a multiple of its size: more is asked for and the ends given back.
+  // A huge page must begin at a multiple of its size: map more memory, then unmap the ends.
   const std::size_t slack = bytes_ >= huge_page ? huge_page : 0;
   void* const raw = ::mmap(nullptr, bytes_ + slack, PROT_READ | PROT_WRITE,
                            MAP_PRIVATE | MAP_ANONYMOUS | MAP_NORESERVE, -1, 0);

@@ -48,7 +48,7 @@ Bvh::Bvh(std::span<const Box3> boxes, std::size_t leaf) : order_(boxes.size()) {
       const double of_a = centres[a][axis], of_b = centres[b][axis];
       return of_a != of_b ? of_a < of_b : a < b;
     });
-    // The first child follows its parent at once; the second tells its place when it comes.
+    // The first child directly follows its parent; the second stores its index in the parent.
     tasks.push_back({middle, task.end, at});
     tasks.push_back({task.begin, middle, none});
   }

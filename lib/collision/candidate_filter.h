@@ -1,5 +1,5 @@
 #pragma once
-// Filter of candidates: those that may be within a distance of each other now.
+// Filter of candidates: selects those whose present distance may be below a bound.
 
 #include "base/vec3.h"
 #include "collision/candidates.h"
@@ -20,8 +20,9 @@ namespace gewebe::collision {
 /// measurement while vertices move little.
 class CandidateFilter {
 public:
-  /// Begins anew: no gap is known. \param candidates, vertices  of the broad phase; both outlive
-  /// this \param vertices  those of all candidates, or more
+  /// Starts with new candidates, without known gaps. Keeps references to both lists.
+  /// \param candidates  of the broad phase
+  /// \param vertices  those of all candidates, or more
   void reset(const Candidates& candidates, std::span<const std::uint32_t> vertices,
              std::span<const Vec3> x);
   /// Pairs whose gap at x (distance minus the sum of radii) may be `range` or less, in the order of
@@ -31,7 +32,7 @@ public:
 private:
   const Candidates* candidates_ = nullptr;
   std::span<const std::uint32_t> vertices_;
-  std::vector<Vec3> reference_; ///< by place in vertices_
+  std::vector<Vec3> reference_; ///< by index in vertices_
   std::vector<double> gap_;     ///< lower bounds at the reference, by candidate
   std::vector<std::pair<std::size_t, double>> measured_; ///< candidate, its gap
   Candidates near_;

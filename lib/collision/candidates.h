@@ -14,8 +14,9 @@
 
 namespace gewebe::collision {
 
-/// Pairs by their vertices. Points of an edge and edges of triangles are covered by the pairs of
-/// edges, so that points meet edges and points only where neither is part of anything larger.
+/// Pairs of primitives, by their vertices. Pairs of edges cover points of edges and edges of
+/// triangles. Pairs of a point with an edge or a point therefore have only primitives that are part
+/// of no larger one.
 struct Candidates {
   std::vector<std::array<std::uint32_t, 2>> point_point;    ///< p < q
   std::vector<std::array<std::uint32_t, 3>> point_edge;     ///< p, e0, e1
@@ -39,25 +40,27 @@ struct Intersection {
   bool operator==(const Intersection&) const = default;
 };
 
-/// Hierarchies over the primitives of each owner. Lives as long as the topology of the surface.
+/// Bounding volume hierarchies over the primitives of each owner. They are valid while the topology
+/// of the surface stays the same.
 class BroadPhase {
 public:
   /// \pre complete_surface(surface)
   explicit BroadPhase(const CollisionSurface& surface);
 
-  /// Finds pairs of owners that may meet, without a vertex in common, not fixed as a whole and of
-  /// which none holds the other,
-  /// whose distance at x0 exceeds d_min + reach by no more than their relative motion to x1.
-  /// \param surface  the one of the constructor
+  /// Finds pairs of primitives whose distance at x0 exceeds d_min + reach by no more than their
+  /// relative motion to x1. Their owners must be allowed to touch. Pairs with a vertex in common
+  /// are left out, and so are pairs of fixed primitives, and pairs where one owner holds the other.
+  /// \param surface  that of the constructor
   /// \param reach  mm
-  /// \param allowed  owners beyond the table meet nothing
+  /// \param allowed  owners beyond the table touch nothing
   /// \param candidates  overwritten; keeps its memory. Order: by pairs of owners, then by number
   void find(const CollisionSurface& surface, std::span<const Vec3> x0, std::span<const Vec3> x1,
             double reach, const AllowedPairs& allowed, Candidates& candidates);
 
-  /// Edges that meet triangles at x, of owners that may meet, without a vertex in common: exact,
-  /// and points in common count. Primitives with a radius are no part of it. \param most  stops
-  /// after that many
+  /// Finds edges that intersect triangles at x, for owners that may touch. Pairs with a vertex in
+  /// common are left out. The test is exact and includes touching. Primitives with a radius are
+  /// left out.
+  /// \param most  largest number of intersections
   std::vector<Intersection> find_intersections(const CollisionSurface& surface,
                                                std::span<const Vec3> x, const AllowedPairs& allowed,
                                                std::size_t most);
@@ -67,13 +70,13 @@ private:
     std::vector<std::uint32_t> number; ///< ascending
     std::vector<Box3> boxes;
     Bvh tree;
-    bool current = false; ///< tree of these x0, x1
+    bool current = false; ///< the tree belongs to the present x0, x1
   };
   struct Owner {
     Primitives points, edges, triangles, lone_points, lone_edges;
     Box3 box;
   };
-  /// Boxes of all vertices of an owner; trees are refitted when they are asked for.
+  /// Sets the boxes of all owners. Trees are refitted when they are needed.
   template <class BoxOf>
   void set_boxes(const BoxOf& box_of);
   template <class BoxOf, class VerticesOf>

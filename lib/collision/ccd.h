@@ -12,7 +12,7 @@
 
 namespace gewebe::collision {
 
-/// What a step must keep. The gap of a pair is its distance minus `d_min`.
+/// Separation that a step must keep. The gap of a pair is its distance minus `d_min`.
 struct Separation {
   double d_min = 0; ///< mm, of this pair
   /// At the end of the step the gap is at least this share of the gap at its start …

@@ -18,7 +18,7 @@ int turn(const Flat& a, const Flat& b, const Flat& c) {
   return turn_sign(a[0], a[1], b[0], b[1], c[0], c[1], tests);
 }
 
-/// Of a and b on one line: whether c, on it too, lies between them.
+/// Whether c lies between a and b. \pre the three points are on one line
 bool between(const Flat& a, const Flat& b, const Flat& c) {
   for (std::size_t axis = 0; axis < 2; ++axis)
     if ((c[axis] < a[axis] && c[axis] < b[axis]) || (c[axis] > a[axis] && c[axis] > b[axis]))

@@ -9,9 +9,10 @@
 
 namespace gewebe::collision {
 
-/// How often triangles that face outwards wind round a point: 1 inside and 0 outside of a closed
-/// surface to rounding, else no integer. Sum of solid angles (A. Van Oosterom, J. Strackee,
-/// The Solid Angle of a Plane Triangle, 1983), so that the time is linear in the triangles.
+/// Winding number of triangles that face outwards round a point: 1 inside and 0 outside of a closed
+/// surface to rounding, else no integer. It is the sum of solid angles (A. Van Oosterom, J.
+/// Strackee, The Solid Angle of a Plane Triangle, 1983), so that the time is linear in the
+/// triangles.
 /// \param x  by vertex
 double winding_number(std::span<const std::array<std::uint32_t, 3>> triangles,
                       std::span<const Vec3> x, const Vec3& p);

@@ -19,17 +19,17 @@ struct CollisionSurface {
   std::vector<Vec3> rest; ///< by vertex, mm
   std::vector<std::array<std::uint32_t, 3>> triangles;
   std::vector<std::array<std::uint32_t, 2>> edges; ///< each once, those of triangles too
-  std::vector<std::uint32_t> points;               ///< vertices that meet triangles
+  std::vector<std::uint32_t> points;               ///< vertices that can touch triangles
   /// By vertex: body or instrument, from 0 on. Vertices of one primitive have one owner.
   std::vector<std::uint32_t> owner;
-  /// By vertex, mm: what the surface lies outside of points, edges and triangles. One of each
-  /// owner. d_min of a pair is the sum of both sides'.
+  /// By vertex, mm: distance of the surface from points, edges and triangles. All vertices of an
+  /// owner have the same radius. d_min of a pair is the sum of both radii.
   std::vector<double> radius;
   std::vector<std::uint8_t> fixed; ///< by vertex: 1 if it never moves; empty: all move
-  /// By vertex: the owner that holds it, or no_owner; empty: none is held. What has a held vertex
-  /// does not meet its holder.
+  /// By vertex: the owner that holds it, or no_owner; empty: none is held. Primitives with a held
+  /// vertex do not touch its holder.
   std::vector<std::uint32_t> holder;
-  // By complete_surface, as is what precedes where noted there:
+  // Set by complete_surface, which also completes the members above:
   std::vector<std::uint32_t> lone_edges;  ///< numbers of edges of no triangle
   std::vector<std::uint32_t> lone_points; ///< points of no edge
 
@@ -40,14 +40,14 @@ struct CollisionSurface {
   }
 };
 
-/// Adds the edges of triangles, makes `edges` ascending and unique, `points` all vertices that are
-/// part of anything or were listed, `owner` and `radius` 0 where they are empty; fills lone_edges
-/// and lone_points.
-/// \throws Error where a vertex is out of range, used twice in a primitive, or lists of vertices
+/// Completes a surface. Adds the edges of triangles, and makes `edges` ascending and unique.
+/// `points` becomes all vertices that are part of a primitive or were listed. `owner` and `radius`
+/// become 0 if they are empty. Fills lone_edges and lone_points.
+/// \throws Error if a vertex is out of range or used twice in a primitive, or lists of vertices
 /// differ in length
 void complete_surface(CollisionSurface& surface);
 
-/// Symmetric table over pairs of owners: who may meet, or friction coefficients.
+/// Symmetric table over pairs of owners: pairs that may touch, or friction coefficients.
 template <class T>
 class OwnerTable {
 public:
@@ -65,7 +65,7 @@ private:
   std::vector<T> value_;
 };
 
-/// Who may meet; the diagonal is contact of an owner with itself.
+/// Pairs of owners that may touch; the diagonal is contact of an owner with itself.
 using AllowedPairs = OwnerTable<std::uint8_t>;
 
 } // namespace gewebe::collision

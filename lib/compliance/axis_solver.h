@@ -1,5 +1,5 @@
 #pragma once
-// A factor that takes and gives vectors over all 3 n axes of a model.
+// Factor of K with vectors over all 3 n axes of a model, held axes included.
 
 #include "base/context.h"
 #include "model/model.h"
@@ -20,16 +20,16 @@ struct AxisSolver {
   void solve(std::span<double> over_axes, std::size_t columns = 1) const;
 };
 
-/// Of K, which is checked for what it determines. \throw Error as checked_factor
+/// Factorises K, and checks its condition. \throw Error as checked_factor
 AxisSolver factorise_axes(const Model& model, const Context& context);
 
-/// Of K with further axes held (3 n flags), which can only make it better determined. \pre some
-/// axis is free   \throw Error as the factor
+/// Factorises K with further axes held (3 n flags), which can only improve its condition.
+/// \pre some axis is free   \throw Error as the factor
 AxisSolver factorise_axes(const Model& model, std::span<const std::uint8_t> held,
                           const Context& context);
 
-/// With a factor of K that was made before. \throw Error if it has other rows than the model free
-/// axes
+/// Solver with a precomputed factor of K.
+/// \throw Error if the number of its rows is not that of the model's free axes
 AxisSolver stored_axes(const Model& model, Factor factor);
 
 } // namespace gewebe

@@ -64,7 +64,7 @@ bool ColumnCache::stored(std::uint32_t node) const {
          std::binary_search(source_->nodes().begin(), source_->nodes().end(), node);
 }
 
-/// \param count of columns that come, some of which may have been made ahead
+/// Makes room for new columns. \param count  of them; some may have been prepared
 void ColumnCache::make_room(std::size_t count) {
   while (!ahead_.empty() && kept_.size() + count + ahead_.size() > capacity_) {
     wide_.give_back(ahead_.begin()->second);
@@ -225,7 +225,7 @@ double ColumnCache::add(std::span<const NodeVector> forces, double allowed, cons
       std::sort(size.begin(), size.end());
       double skipped = 0;
       for (std::size_t k = 0; k < size.size(); ++k) {
-        // Equal ones are skipped together or not at all, so that the limit tells which.
+        // Equal bounds are skipped together or not at all, so that the limit alone decides.
         const double next = k + 1 < size.size() ? size[k + 1] : HUGE_VAL;
         skipped += size[k];
         if (!(skipped * (1 + 1e-12) <= allowed))

@@ -1,5 +1,5 @@
 #pragma once
-// Columns of the compliance matrix C = K⁻¹ in memory, as many as fit, and sums of them.
+// Cache of columns of the compliance matrix C = K⁻¹ in memory, as many as fit, and sums of them.
 
 #include "base/columns.h"
 #include "base/context.h"
@@ -16,43 +16,47 @@
 
 namespace gewebe {
 
-/// Computes the columns of one to eight nodes: 9 m numbers each, one node behind the other.
+/// Computes the columns of one to eight nodes: 9 m numbers each, node by node.
 using ColumnSolve =
     std::function<void(std::span<const std::uint32_t> nodes, std::span<double> columns)>;
 
 class ColumnCache {
 public:
-  /// Of columns with rows for the first m = `nodes` nodes. \param source of those that are stored,
-  /// or null; kept by reference \param bytes that columns in memory may take, but two nodes' at
-  /// least \param bounded whether sums may skip what a tolerance allows
+  /// Creates a cache of columns with rows for the first m = `nodes` nodes.
+  /// \param source  of stored columns, or null; kept by reference
+  /// \param bytes  limit of columns in memory; those of two nodes always fit
+  /// \param bounded  whether add() may be called with `allowed` > 0
   ColumnCache(std::size_t nodes, const ColumnSource* source, ColumnSolve solve, double bytes,
               bool bounded);
 
-  /// How many nodes' columns fit in memory.
+  /// Number of nodes whose columns fit in memory.
   std::size_t capacity() const noexcept { return capacity_; }
   bool stored(std::uint32_t node) const;
   bool resident(std::uint32_t node) const { return kept_.contains(node); }
   std::uint64_t columns_read() const noexcept { return read_; }
 
-  /// Brings these to memory; those used longest ago leave it where there is no room.
-  /// \pre at most capacity() of them   \throw Error if they can't be read or solved
+  /// Brings columns to memory. If there is no room, the least recently used ones are dropped.
+  /// \pre at most capacity() nodes   \throw Error if columns can't be read or solved for
   void need(std::span<const std::uint32_t> nodes);
 
-  /// Solves ahead of `need` for what is neither stored nor resident; nothing but `need` sees it,
-  /// and it leaves memory before what was needed. \throw Error if all does not fit
+  /// Solves, ahead of `need`, for columns that are neither stored nor resident. Only `need` uses
+  /// these columns, and they are dropped before those that were needed.
+  /// \throw Error if they do not all fit
   void prepare(std::span<const std::uint32_t> nodes);
 
   /// Entry of a row (axis 3 i + a) in the column of a node's axis. \pre the node is resident
   double entry(std::uint32_t node, int axis, std::size_t row) const;
 
-  /// sum += C f for forces at resident nodes, in their order; the same bytes for any number of
-  /// threads. Of each block of rows, the contributions whose bounds add up to `allowed` (mm) or
-  /// less are left out. \return largest sum of bounds left out of a row \pre sum.size() == 3 m;
-  /// allowed is 0 unless bounded
+  /// sum += C f for forces at resident nodes, in their order. The result is the same bytes for any
+  /// number of threads. In each block of rows, contributions are left out whose bounds add up to at
+  /// most `allowed` (mm).
+  /// \return largest sum of bounds left out of a row
+  /// \pre sum.size() == 3 m; allowed is 0 unless bounded
   double add(std::span<const NodeVector> forces, double allowed, const Context& context,
              std::span<double> sum) const;
 
-  /// Contributions of a node's column to a block of rows that a sum took and skipped, so far.
+  /// Number of contributions of a node's column to a block of rows that sums took, or skipped, so
+  /// far.
   std::uint64_t taken() const noexcept { return taken_; }
   std::uint64_t skipped() const noexcept { return skipped_; }
 

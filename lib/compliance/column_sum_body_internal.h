@@ -1,5 +1,5 @@
 #pragma once
-// The body of column_sum_*.cpp, each of which compiles it for its instruction set.
+// Body of column_sum_*.cpp. Each of these files compiles it for its instruction set.
 
 #include "base/four_lanes.h"
 #include "compliance/column_sum.h"
@@ -10,7 +10,7 @@
 namespace gewebe {
 namespace {
 
-// Small integers take intrinsics: compilers widen them one by one.
+// Small integers need intrinsics, because compilers widen them one by one.
 inline void widen(__m128i whole, Four& to) { // four of 32 bits
 #ifdef __AVX2__
   to = reinterpret_cast<Four>(_mm256_cvtepi32_pd(whole));
@@ -68,8 +68,8 @@ void add(const Entry* const* column, const double* factor, double* sum, std::siz
       sum[r] += static_cast<double>(from[k][r]) * by[k];
 }
 
-/// Eight columns at a time over rows whose sums stay in the first cache: so many streams as the
-/// hardware fetches ahead.
+/// Sums eight columns at a time over rows whose sums stay in the L1 cache. Eight is the number of
+/// streams that the hardware prefetches.
 template <class Entry>
 void add_all(const Entry* const* column, const double* factor, std::size_t count, double* sum,
              std::size_t begin, std::size_t end) {

@@ -1,6 +1,6 @@
 #pragma once
-// Columns of the compliance matrix C = K⁻¹ for chosen nodes: what the whole object does when one of
-// them is pulled.
+// Columns of the compliance matrix C = K⁻¹ for chosen nodes: the displacement of the whole object
+// under a unit force at one of them.
 
 #include "base/columns.h"
 #include "base/context.h"
@@ -13,26 +13,26 @@
 
 namespace gewebe {
 
-/// So many nodes, one behind the other from the first one on, are solved and checked together.
+/// Number of consecutive nodes that are solved for and checked together.
 inline constexpr std::size_t compliance_block = Factor::max_units / 3;
 
 /// Solves for the columns of `nodes` in blocks, in parallel, and hands them to `sink` in the order
-/// of `nodes` while later ones are being computed. The same bytes for any number of threads. Memory
-/// is bounded by the number of threads, not by that of nodes.
+/// of `nodes` while later ones are being computed. Results are the same bytes for any number of
+/// threads. Memory grows with the number of threads, not with that of nodes.
 ///
-/// They have rows for the first `row_nodes` nodes, or all if there are fewer; what is solved for
-/// and checked is whole.
+/// The columns have rows for the first `row_nodes` nodes, or all if there are fewer. Whole columns
+/// are solved for and checked.
 ///
-/// `norm` is ‖K‖₁. Of each block of columns a sum with different weights is put back into K u = f.
-/// Returns the largest backward error of these.
+/// `norm` is ‖K‖₁. As a check, a weighted sum of each block of columns, with different weights, is
+/// put into K u = f. Returns the largest backward error of these sums.
 /// \pre nodes < n, ascending; the factor is of this matrix
-/// \throw Error if that exceeds max_backward_error, if memory exceeds the context's, what the sink
-/// throws; Cancelled
+/// \throw Error if that error exceeds max_backward_error, or if memory exceeds the context's; the
+/// exceptions of the sink; Cancelled
 double compliance_columns(const StiffnessMatrix& matrix, const Factor& factor, double norm,
                           std::span<const std::uint32_t> nodes, const Context& context,
                           ColumnSink& sink, std::size_t row_nodes = SIZE_MAX);
 
-/// Bytes that it takes beside matrix and factor.
+/// Memory of compliance_columns beside matrix and factor, bytes.
 double compliance_columns_bytes(const StiffnessMatrix& matrix, std::size_t nodes,
                                 const Context& context, std::size_t row_nodes = SIZE_MAX);
 

@@ -1,7 +1,7 @@
 #pragma once
-// What the compliance C = K⁻¹ of a model is had from: its springs alone, a factor, columns beside
-// it, or what a cut made of them. Who has it says so by one of the functions below; who asks
-// (compliance/compliance.h) does not see which it is.
+// Source of the compliance C = K⁻¹ of a model: its springs, a factor, stored columns with a factor,
+// or a correction of these after a cut. The functions below create sources. Their user
+// (compliance/compliance.h) is the same for all.
 
 #include "base/columns.h"
 #include "base/context.h"
@@ -22,7 +22,7 @@ class ForwardBlocks;
 /// C at the axes of a node and of another, [axis][axis of the other].
 using ComplianceBlock = std::array<std::array<double, 3>, 3>;
 
-/// Serves one Compliance, from one thread at a time.
+/// Source of one Compliance. It is used from one thread at a time.
 class ComplianceSource {
 public:
   ComplianceSource() = default;
@@ -30,32 +30,34 @@ public:
   ComplianceSource& operator=(const ComplianceSource&) = delete;
   virtual ~ComplianceSource() = default;
 
-  /// Comes before any solve. Keeps a reference to the model. \pre it is that of this source
-  /// \throw Error as factorise_axes, where nothing was made beforehand
+  /// To be called before any solve. Keeps a reference to the model. \pre it is that of this source
+  /// \throw Error as factorise_axes, if no factor was made beforehand
   virtual void open(const Model& model, const Context& context) = 0;
-  /// As AxisSolver::solve. What was made beforehand is loaded by the first call. \throw as that
+  /// As AxisSolver::solve. The first call loads a factor that was made beforehand.
+  /// \throw as AxisSolver::solve
   virtual void solve(std::span<double> over_axes, std::size_t columns) = 0;
-  /// Doubles that a solve reads twice for a right-hand side: an estimate before the first one.
+  /// Number of doubles that a solve reads twice for a right-hand side. Before the first solve it is
+  /// an estimate.
   virtual std::size_t entries() const = 0;
-  /// How often K was factorised or its factor loaded.
+  /// Number of times that K was factorised or its factor loaded.
   virtual std::uint64_t factors() const { return 0; }
   /// Columns of some nodes or of all, or null. They may be read without open.
   virtual const ColumnSource* columns() const { return nullptr; }
-  /// Blocks between nodes for less than their columns cost, or null.
+  /// Source of blocks between nodes that costs less than their columns, or null.
   virtual ForwardBlocks* blocks() { return nullptr; }
 };
 
-/// What was computed beforehand and kept. The factor is asked for when first needed, once.
+/// Precomputed columns and factor of a model.
 struct StoredStiffness {
   std::unique_ptr<ColumnSource> columns; ///< null: of no node
-  std::function<Factor()> factor;
+  std::function<Factor()> factor;        ///< called once, when the factor is first needed
 };
 
-/// K is factorised when the source is opened.
+/// Source without stored data: K is factorised when the source is opened.
 std::shared_ptr<ComplianceSource> compliance_of_model();
-/// With a factor of K, asked for when first needed. \pre factor
+/// Source with a factor of K. \param factor  called when the factor is first needed; not empty
 std::shared_ptr<ComplianceSource> compliance_of_factor(std::function<Factor()> factor);
-/// With columns too. \pre stored.factor
+/// Source with columns and a factor. \pre stored.factor is not empty
 std::shared_ptr<ComplianceSource> compliance_of_store(StoredStiffness stored);
 
 } // namespace gewebe

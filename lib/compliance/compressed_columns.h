@@ -1,12 +1,13 @@
 #pragma once
-// Columns of the compliance C that take a twentieth of their room or less, every entry within a
-// bound, evaluated as they are.
+// Compressed columns of the compliance C. They take a twentieth of their memory or less, with a
+// bound for the error of each entry, and are evaluated without decompression.
 //
-// Nodes are put into clusters by their places (compliance/node_clusters.h), those that have columns
-// apart from the rest. A block of C between two clusters is smooth unless they touch, and a sum of
-// few crosses of small integers (compliance/crosses.h). C is symmetric: of two blocks that mirror
-// each other one is kept. The blocks of a cluster with itself and with all clusters behind it make
-// a chunk, which is loaded when one of them is first needed.
+// Nodes are put into clusters by their positions (compliance/node_clusters.h); nodes with columns
+// and nodes without are in different clusters. A block of C between two clusters is smooth unless
+// they touch, and is stored as a sum of few rank-one terms of small integers
+// (compliance/crosses.h). C is symmetric, so one of two transposed blocks is stored. The blocks of
+// a cluster with itself and with all later clusters form a chunk. A chunk is loaded when one of its
+// blocks is first needed.
 
 #include "base/columns.h"
 #include "base/context.h"
@@ -24,33 +25,33 @@
 
 namespace gewebe {
 
-/// What is known of compressed columns without any of their numbers.
+/// Structure of compressed columns, without their entries.
 struct CompressedLayout {
   NodeClusters clusters;         ///< of the m nodes that columns have rows for
-  std::size_t with_columns = 0;  ///< the first so many clusters are of the nodes with columns
+  std::size_t with_columns = 0;  ///< number of clusters of nodes with columns; these come first
   std::vector<CrossCount> count; ///< by block: chunk by chunk, cluster by cluster
-  double relative = 0;           ///< the bound that was asked for, over the largest entry of C
-  double bound = 0;              ///< what any entry may be wrong by, mm for 1e-6 N
+  double relative = 0;           ///< requested error bound, over the largest entry of C
+  double bound = 0;              ///< largest error of an entry, mm for 1e-6 N
 };
 
-/// \throw Error if it contradicts itself or isn't of the first `row_nodes` nodes: it may come from
-/// a file
+/// Checks a layout that comes from a file.
+/// \throw Error if it contradicts itself or isn't of the first `row_nodes` nodes
 void check_layout(const CompressedLayout& layout, std::size_t row_nodes);
 /// Bytes of each chunk. \pre check_layout passed
 std::vector<std::uint64_t> chunk_sizes(const CompressedLayout& layout);
 /// A chunk as bytes: scales, then int16, then int8, little-endian.
 std::vector<std::uint8_t> bytes_of(const Crosses& chunk);
 
-/// Forces on nodes of one cluster, by the numbers that its blocks have.
+/// Forces on nodes of one cluster, by the nodes' numbers in its blocks.
 struct ClusterLoad {
   std::size_t cluster = 0;
   std::vector<CrossLoad> load;
 };
 
-/// Asked for the bytes of a chunk once at most.
+/// Reads the bytes of a chunk. It is called at most once for each chunk.
 using ChunkReader = std::function<std::vector<std::uint8_t>(std::size_t chunk)>;
 
-/// Not to be used from several threads at once.
+/// Compressed columns with their loaded chunks. Not to be used from several threads at once.
 class CompressedColumns final : public ColumnSource {
 public:
   /// \param nodes n, of all nodes of the model   \pre check_layout passed for n nodes or fewer
@@ -60,7 +61,7 @@ public:
   std::size_t node_count() const override { return node_count_; }
   std::size_t row_nodes() const override { return place_.size(); }
   const std::vector<std::uint32_t>& nodes() const override { return nodes_; }
-  /// Puts a node's columns together. \throw what the reader throws, as all below
+  /// Decompresses a node's columns. \throw as the reader; so do all members below
   void read(std::size_t k, std::span<double> out) const override;
   const CompressedColumns* compressed() const override { return this; }
   EntryBound bound() const override { return {layout_.relative, layout_.bound}; }
@@ -68,19 +69,20 @@ public:
   bool has(std::uint32_t node) const {
     return node < place_.size() && cluster_[node] < layout_.with_columns;
   }
-  /// C between a node that has columns and any other of the first m, [axis][axis of the other];
-  /// that of the two in the other order is its transpose, bit by bit.
+  /// Block of C between a node that has columns and any other of the first m, [axis][axis of the
+  /// other]. Exchanging the nodes gives the transpose, to the bit.
   std::array<std::array<double, 3>, 3> block(std::uint32_t node, std::uint32_t other) const;
-  /// One entry of it, bit by bit: a row's displacement under a force along an axis of the node.
+  /// Entry of a block, with the same bits: a row's displacement under a force along an axis of the
+  /// node.
   double entry(std::uint32_t node, int axis, std::size_t row) const;
-  /// u += C f over the first 3 m axes, for forces at nodes that have columns. The same bytes for
-  /// any number of threads.
+  /// u += C f over the first 3 m axes, for forces at nodes that have columns. The result is the
+  /// same bytes for any number of threads.
   void add(std::span<const NodeVector> forces, const Context& context, std::span<double> u) const;
 
-  /// Numbers that a sum with forces at these nodes takes from memory.
+  /// Number of values that a sum with forces at these nodes reads from memory.
   double numbers(std::span<const std::uint32_t> nodes) const;
 
-  /// Reads all chunks that were not yet needed, so that none is waited for later.
+  /// Reads all chunks that were not yet needed, so that later calls need not wait for any.
   void read_all() const;
 
   /// A chunk as it was read.
@@ -95,7 +97,7 @@ private:
   /// C f at a cluster's nodes in their order.
   std::vector<double> sum_at(std::size_t cluster, std::span<const ClusterLoad> loads,
                              CpuLevel cpu) const;
-  /// C is taken with the first of two nodes first, so that both orders have the same bits.
+  /// Order of two nodes in which C is evaluated, so that both orders give the same bits.
   bool is_before(std::uint32_t a, std::uint32_t b) const {
     return of(a) < of(b) || (of(a) == of(b) && place_[a] < place_[b]);
   }

@@ -43,7 +43,7 @@ bool ContactBlock::append(std::span<const double> added) {
 
 void ContactBlock::remove(std::size_t first, std::size_t count) {
   const std::size_t behind = size_ - first - count;
-  // Of the rows behind: L22' L22'ᵀ = L22 L22ᵀ + L21 L21ᵀ, one column of L21 at a time.
+  // Update of the later rows: L22' L22'ᵀ = L22 L22ᵀ + L21 L21ᵀ, one column of L21 at a time.
   std::vector<double> left(behind * count);
   for (std::size_t k = 0; k < behind; ++k) {
     const double* const from = row(first + count + k);

@@ -1,7 +1,7 @@
 #pragma once
-// The Cholesky factor of the compliance among a set of contacts, C_cc = L Lᵀ, that follows the set:
-// a contact that joins appends its rows, one that leaves takes a rank-3 update of what stands
-// behind it (Golub & Van Loan, Matrix Computations, 6.5).
+// Cholesky factor of the compliance among a changing set of displaced nodes, C_cc = L Lᵀ. A node
+// that joins appends its rows. A node that leaves needs a rank-3 update of all later rows (Golub &
+// Van Loan, Matrix Computations, 6.5).
 
 #include <cstddef>
 #include <functional>
@@ -14,9 +14,9 @@ class ContactBlock {
 public:
   std::size_t size() const noexcept { return size_; }
 
-  /// Appends one row of the matrix: its entries with the rows there are, then its diagonal.
-  /// \return false, and nothing changed, if the matrix would not be positive definite \pre
-  /// added.size() == size() + 1
+  /// Appends one row of the matrix: its entries with the present rows, then its diagonal.
+  /// \return false, and nothing is changed, if the matrix would not be positive definite
+  /// \pre added.size() == size() + 1
   bool append(std::span<const double> added);
 
   /// Removes the rows and columns [first, first + count).

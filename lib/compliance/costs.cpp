@@ -17,8 +17,8 @@ std::size_t nodes_worth_a_solve(std::size_t entries, std::size_t axes, bool sing
 }
 
 std::size_t max_in_block(bool stored) {
-  // The 1200 rows of 400 nodes take 12 MB, read twice an update. Columns that are not stored cost
-  // three solves each, a fresh factor with axes held some dozens.
+  // The 1200 rows of 400 nodes take 12 MB, read twice per update. Columns that are not stored cost
+  // three solves for each node; a fresh factor with axes held costs some dozens of solves.
   return stored ? 400 : 32;
 }
 
@@ -37,11 +37,11 @@ bool woodbury_pays(const CutCosts& cut) {
   // what a partial refactorisation and Woodbury do for each node, whatever is cut.
   constexpr double front_operation = 0.6e-4, solve_operation = 0.6e-4;
   constexpr double refactor_node = 0.3, woodbury_node = 0.3;
-  // Behind Woodbury contacts need columns, behind a refactorisation forward solves do.
+  // After Woodbury, contacts need columns; after a refactorisation, forward solves suffice.
   constexpr double contact_panels = 1;
-  // Of all operations, what a cut reaches as long as none has told.
+  // Share of all operations that a cut affects; used until the first cut has been measured.
   constexpr double usual_reach = 0.3;
-  // Each solution takes a pass over the low rank; beyond so many it costs as much again.
+  // Each solution needs a pass over the low-rank part. Beyond this rank the pass doubles its cost.
   constexpr std::size_t max_rank = 48;
   const auto nodes = static_cast<double>(cut.nodes);
   const double reach = cut.reached > 0 ? cut.reached : usual_reach * cut.all_operations;

@@ -153,7 +153,7 @@ bool ForcesAt::meet(const Load& now) {
   return true;
 }
 
-/// By what a rigid motion of the contacts_ did before, if this is one. \return whether it was
+/// Combines earlier shapes of rigid motions, if this is a rigid motion. \return whether it is
 bool ForcesAt::shape(const Load& now, std::vector<double>& u) {
   if (contacts_.size() < costs::worth_modes || (modes_.size() == 0 && !modes_.open()))
     return false;

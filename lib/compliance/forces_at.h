@@ -1,6 +1,6 @@
 #pragma once
-// Displaced nodes by the block C_cc on their free axes: f_c = C_cc⁻¹ (d - u_c of all other loads).
-// Its factor follows the set as nodes join and leave.
+// Solver for prescribed displacements by the block C_cc on their free axes: f_c = C_cc⁻¹ (d - u_c
+// of all other loads). Its factor is updated when nodes join and leave.
 
 #include "compliance/compliance.h"
 #include "compliance/contact_block.h"
@@ -17,35 +17,40 @@
 
 namespace gewebe {
 
+/// Reactions of a set of displaced nodes.
 class ForcesAt {
 public:
   /// Keeps references to all.
   ForcesAt(const Model& model, Compliance& compliance, LoadAnswer& answer)
       : model_(model), compliance_(compliance), answer_(answer) {}
 
-  /// Whether displacements cost less this way. \param limit nodes up to which they do; SIZE_MAX: by
-  /// what is at hand
+  /// Whether this solver is cheaper for a load.
+  /// \param limit  number of displaced nodes up to which it is; SIZE_MAX: from the cost model and
+  /// the available columns
   bool cheaper(const Load& now, std::size_t limit) const;
-  /// Finds the forces. \return whether they meet the displacements
+  /// Finds the forces. \return whether they produce the displacements
   bool meet(const Load& now);
-  /// Of the last load that was met, by ascending node.
+  /// Reactions under the last load of meet(), by ascending node.
   std::vector<NodeVector> forces() const { return by_node(force_); }
-  /// The first rows() of the shape under that load by what a rigid motion of these nodes did
-  /// before, if this is one. \return whether it was
+  /// The first rows() of the shape under that load, if the displacements are a rigid motion of
+  /// these nodes whose shape follows from earlier ones. \return whether it was found
   bool shape(const Load& now, std::vector<double>& u);
-  /// Loads with this set whose shapes were asked for otherwise, this one among them.
+  /// Number of loads with these nodes whose shapes were computed by other means, this one included.
   int shapes() {
     shapes_ += counted_ ? 0 : 1;
     counted_ = true;
     return shapes_;
   }
 
-  /// The rows of C_cc, x = C_cc⁻¹ x, and the forces by row.
+  /// Rows of C_cc.
   std::vector<std::size_t> axes() const;
+  /// x = C_cc⁻¹ x.
   void solve(std::span<double> x) const { block_.solve(x); }
+  /// Forces by row of C_cc.
   std::span<const double> force() const { return force_; }
 
-  double largest_miss() const noexcept { return miss_; } ///< so far, over the largest displacement
+  /// Largest error of a prescribed displacement so far, over the largest displacement.
+  double largest_miss() const noexcept { return miss_; }
 
 private:
   struct Contact {
@@ -63,11 +68,11 @@ private:
   std::vector<Contact> contacts_; ///< in order of arrival
   ContactBlock block_;
   std::uint64_t changes_ = 0;    ///< of the block
-  std::vector<double> question_; ///< what they have to be moved by, beyond other loads
+  std::vector<double> question_; ///< d - u_c
   std::vector<double> force_;    ///< by axis of the block
   int shapes_ = 0;               ///< see shapes()
-  bool counted_ = false;         ///< the last load among them
-  ShapeModes modes_;             ///< of this set: question to shape
+  bool counted_ = false;         ///< shapes_ includes the last load
+  ShapeModes modes_;             ///< of these nodes: from d - u_c to the shape
   double miss_ = 0;
 };
 

@@ -1,6 +1,6 @@
 #pragma once
-// Blocks of the compliance between a few nodes from forward solves with a factor that follows cuts:
-// what forces at contacts need, without a column of C.
+// Blocks of the compliance between a few nodes, from forward solves with a factor that is updated
+// after cuts. Contact forces need only these blocks, and no column of C.
 
 #include "compliance/compliance_source.h"
 #include "solve/frontal_factor.h"
@@ -16,14 +16,15 @@ namespace gewebe {
 
 class ForwardBlocks {
 public:
-  /// \param check called before the factor is read; throws where it is no longer that of the model
+  /// \param check  called before the factor is read; throws if it is no longer that of the model
   ForwardBlocks(std::shared_ptr<FrontalFactor> factor, std::function<void()> check);
 
-  /// Prepares blocks between these nodes and all that were needed before; those may be forgotten.
+  /// Prepares blocks between these nodes, and between these and nodes that were needed before.
+  /// Earlier nodes may be dropped.
   void need(std::span<const std::uint32_t> nodes);
-  /// \pre both nodes were among the last ones needed
+  /// \pre both nodes were in the last call of need()
   ComplianceBlock block(std::uint32_t node, std::uint32_t other) const;
-  /// C f at these nodes, by a load that the factor carries along from cut to cut.
+  /// C f at these nodes, from a solution that the factor updates from cut to cut.
   /// \pre the nodes were among the last ones needed
   std::vector<Vec3> answers(std::span<const double> over_axes,
                             std::span<const std::uint32_t> nodes);

@@ -1,7 +1,7 @@
 #pragma once
-// u = C f for the forces and the weight of a load, where loads follow one another: sums follow
-// their changes, and where only a few rows are asked for these alone are computed. What is inside
-// a solid, behind the rows that the compliance's sums have, is solved for when it is asked for.
+// Displacement u = C f for the forces and the weight of successive loads. Sums are updated by the
+// changes of the load. If a caller reads a few rows, only these are computed. Inner nodes of a
+// solid, which sums of the compliance have no rows for, are solved for when they are first read.
 
 #include "compliance/compliance.h"
 #include "contact/load.h"
@@ -17,31 +17,32 @@
 
 namespace gewebe {
 
-/// The forces and weights of a load over all 3 n axes, its displacements left out.
+/// Forces and weights of a load over all 3 n axes, without its displacements.
 std::vector<double> forces_over_axes(const Model& model, const Load& load);
 
-/// The nodes of a list by node, in their order, and its vectors as a list.
+/// Keys of a map by node, in their order; and the map as a list.
 std::vector<std::uint32_t> nodes_of(const std::map<std::uint32_t, Vec3>& values);
 std::vector<NodeVector> as_vectors(const std::map<std::uint32_t, Vec3>& values);
 
+/// Displacement ("answer") under the last load, and its update for the next one.
 class LoadAnswer {
 public:
   /// Keeps references to both.
   LoadAnswer(const Model& model, Compliance& compliance);
 
-  /// Whether the answer to this load is the last one.
+  /// Whether the last answer is that for this load.
   bool known(const Load& load) const { return load.gravity == gravity_ && load.force == force_; }
-  /// The answer at the first rows() of the compliance.
+  /// Answer at the first rows() of the compliance.
   const std::vector<double>& whole(const Load& load);
-  /// Answers to come are to the bit what they are behind whole(load), which is put off until one is
-  /// asked for.
+  /// Deferred form of whole(load): later answers have the same bits as after whole(load), but the
+  /// work is done when one of them is first read.
   void note(const Load& load);
-  /// That to the weight alone; empty for none.
+  /// Answer for the weight only; empty without gravity.
   const std::vector<double>& weight(const Vec3& gravity);
-  /// Rows of the answer at all axes. The same bits whatever answers were asked for.
+  /// Rows of the answer, at any axes. The bits do not depend on earlier calls.
   std::vector<double> at(const Load& load, std::span<const std::size_t> rows);
-  /// The same of nodes whose blocks the compliance has made ready, to other bits: where it can, by
-  /// a load that its factor carries along.
+  /// The same for nodes whose blocks the compliance has prepared. If possible it uses a solution
+  /// that the factor updates, so that the bits differ from those of at().
   std::vector<double> at_blocks(const Load& load, std::span<const std::size_t> rows);
 
 private:
@@ -55,16 +56,16 @@ private:
   Compliance& compliance_;
   Vec3 weight_gravity_;
   std::vector<double> weight_;
-  std::map<std::uint32_t, Vec3> force_; ///< that the answer is to, once it is settled
+  std::map<std::uint32_t, Vec3> force_; ///< load of the answer, once it is settled
   Vec3 gravity_;
   std::vector<double> answer_;
-  std::uint64_t increments_ = 0; ///< by which it came to be
-  // What it lacks: all of these forces first, then increments.
+  std::uint64_t increments_ = 0; ///< number of updates of answer_
+  // Deferred work: first all of these forces, then the increments.
   std::optional<std::vector<NodeVector>> fresh_;
   std::vector<std::vector<NodeVector>> pending_;
-  Load solved_; ///< whose answer over all axes is known
+  Load solved_; ///< load of everywhere_
   std::vector<double> everywhere_;
-  Load carried_; ///< whose answer is known at some nodes
+  Load carried_; ///< load of carried_at_
   std::map<std::uint32_t, Vec3> carried_at_;
 };
 

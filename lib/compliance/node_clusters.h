@@ -1,5 +1,5 @@
 #pragma once
-// Nodes that lie together.
+// Clusters of nodes that are near each other.
 
 #include "base/vec3.h"
 
@@ -21,8 +21,9 @@ struct NodeClusters {
   }
 };
 
-/// Appends clusters of `most` nodes or fewer: halves of their box across its longest side, again
-/// and again, with as many nodes in both. \pre most > 0, positions of the nodes are finite
+/// Appends clusters of `most` nodes or fewer, by recursive bisection: the nodes are divided across
+/// the longest side of their box into two halves of equal size.
+/// \pre most > 0, positions of the nodes are finite
 void append_clusters(std::span<const Vec3> positions, std::span<const std::uint32_t> nodes,
                      std::size_t most, NodeClusters& to);
 

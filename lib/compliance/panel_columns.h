@@ -1,7 +1,7 @@
 #pragma once
-// From panels, where what a row has of all columns stands side by side, to columns one behind the
-// other, with a weighted sum of each row. Compiled once per CPU level; every level gives the same
-// bits, for there is no fused multiplication and each row is summed in the order of the columns.
+// Copies panels, which are stored by rows, to columns, and computes a weighted sum of each row. It
+// is compiled once per CPU level. Every level gives the same bits, because there is no fused
+// multiplication and each row is summed in the order of the columns.
 
 #include "base/cpu.h"
 
@@ -13,9 +13,9 @@ namespace gewebe {
 
 struct PanelRows {
   const double* x = nullptr;           ///< x[place][column]
-  std::size_t width = 0;               ///< from one place to the next
+  std::size_t width = 0;               ///< distance from one place to the next
   std::span<const std::int64_t> place; ///< of each row
-  /// Where a row goes in a column: ascending; rows from `end` on go nowhere.
+  /// Index of a row in a column: ascending. Rows with an index of `end` or more are not copied.
   std::span<const std::int64_t> at;
   std::int64_t end = 0;
 };

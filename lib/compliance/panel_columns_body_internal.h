@@ -1,5 +1,5 @@
 #pragma once
-// The body of panel_columns_*.cpp, each of which compiles it for its instruction set.
+// Body of panel_columns_*.cpp. Each of these files compiles it for its instruction set.
 
 #include "base/four_lanes.h"
 #include "compliance/panel_columns.h"
@@ -12,7 +12,7 @@ namespace {
 
 inline constexpr std::size_t rows_at_once = 8; ///< two blocks, whose sums don't wait for each other
 
-/// Rows to columns, of a block of four.
+/// Transposes a block of four rows.
 inline void transpose(Four& a, Four& b, Four& c, Four& d) {
   const Four low = __builtin_shufflevector(a, b, 0, 4, 2, 6);
   const Four high = __builtin_shufflevector(a, b, 1, 5, 3, 7);
@@ -28,7 +28,7 @@ inline const double* panel_row(const PanelRows& rows, std::size_t r) {
   return rows.x + static_cast<std::size_t>(rows.place[r]) * rows.width;
 }
 
-/// Eight rows that stand one behind the other in a column, four columns at a time.
+/// Copies eight rows that are consecutive in a column, four columns at a time.
 inline void take_together(const PanelRows& rows, std::size_t first, std::span<double* const> column,
                           const double* weight, double* sum) {
   const double* x[rows_at_once];
@@ -81,7 +81,7 @@ inline void take(const PanelRows& rows, std::span<double* const> column, const d
   const std::size_t count = rows.place.size();
   for (std::size_t r = 0; r < count;) {
     const std::size_t last = r + rows_at_once - 1;
-    if (last + ahead < count) // places are far from each other, which no hardware foresees
+    if (last + ahead < count) // places are scattered, so that the hardware can't prefetch them
       for (std::size_t i = 0; i < rows_at_once; ++i)
         for (std::size_t c = 0; c < rows.width; c += line)
           __builtin_prefetch(panel_row(rows, r + ahead + i) + c);

@@ -1,7 +1,8 @@
 #pragma once
-// What a linear object answered before: an orthonormal basis of the questions asked so far, with
-// the answer to each. A grasp that moves rigidly asks within twelve dimensions (the entries of its
-// turn and its shift), so that its cost does not depend on how many nodes it holds.
+// Cache of responses of a linear object: an orthonormal basis of the inputs ("questions") so far,
+// with the output ("answer") for each. The inputs of a grasp that moves rigidly have twelve
+// dimensions (the entries of its rotation and its translation), so that its cost does not depend on
+// the number of nodes.
 
 #include <cstddef>
 #include <span>
@@ -9,9 +10,10 @@
 
 namespace gewebe {
 
+/// Basis of inputs and their outputs.
 class ShapeModes {
 public:
-  /// Most modes that pay: those of a rigid grasp, and some for a load beside it and for rounding.
+  /// Largest number of modes: those of a rigid grasp, and some for other loads and for rounding.
   static constexpr std::size_t max_questions = 16;
 
   void clear();
@@ -19,17 +21,18 @@ public:
   bool open() const noexcept { return questions_.size() < max_questions && !given_up_; }
   std::size_t size() const noexcept { return questions_.size(); }
 
-  /// The coefficients of `question` in the basis, and in `rest` what is outside its span.
-  /// \return whether that is nothing, up to rounding (1e-11 of the question)
+  /// Finds the coefficients of `question` in the basis, and its part outside the span, `rest`.
+  /// \return whether `rest` is zero up to rounding (1e-11 of the question)
   bool express(std::span<const double> question, std::vector<double>& coefficients,
                std::vector<double>& rest) const;
-  /// One more mode. \param question outside the span (a `rest`), of length 1 \param answer of its
-  /// own
+  /// Adds a mode.
+  /// \param question  outside the span (a `rest`), of length 1
+  /// \param answer  for this question
   void add(std::vector<double> question, std::vector<double> answer);
-  /// Questions go everywhere: no mode is added any more, and those there are make room.
+  /// To be called if questions have no common subspace: frees all modes and accepts no more.
   void give_up();
 
-  /// answer += Σ coefficients[k] answer k.
+  /// answer += Σ coefficients[k] times the answer of mode k.
   void answer(std::span<const double> coefficients, std::span<double> answer) const;
 
 private:

@@ -1,6 +1,6 @@
 #pragma once
-// Equal pieces of memory that lie in huge pages where the system has them: what is read as fast as
-// memory gives it must not wait for page tables.
+// Pool of equal pieces of memory, in huge pages if the system has them, so that fast sequential
+// reads do not wait for page tables.
 
 #include "base/huge_pages.h"
 
@@ -16,7 +16,7 @@ class SlotPool {
 public:
   explicit SlotPool(std::size_t size) : size_(size) {}
 
-  /// So many numbers, of no value yet.
+  /// Takes a slot of uninitialised numbers.
   T* take() {
     if (free_.empty()) {
       constexpr std::size_t chunk_bytes = std::size_t{16} << 20U;

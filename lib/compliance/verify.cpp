@@ -40,7 +40,8 @@ public:
       : matrix_(matrix), tolerance_(tolerance), bound_(bound), context_(context),
         load_(matrix.order()), x_(matrix.order()) {}
 
-  /// Along `solved` anew, or the next axis that is free. `columns` as base/columns.h has them.
+  /// Solves again along the axis `solved`, or the next one that is free, and compares.
+  /// \param columns  as in base/columns.h
   void compare(std::uint32_t node, std::size_t solved, std::span<const double> columns,
                Verification& result) {
     const std::size_t axes = columns.size() / 3; // of the first nodes

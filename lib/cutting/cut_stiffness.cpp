@@ -126,9 +126,9 @@ CutStiffness::CutStiffness(std::shared_ptr<const Model> first,
   context_.progress = nullptr;
 }
 
-/// \throw SingularStiffness if the condition is too large. A pivot is the first to tell; what moves
-/// most freely then moves with its axis, whose column of C tells how freely; where that is much,
-/// the norm of C is estimated.
+/// Checks the condition of K in three steps. A small pivot is the first sign. The column of C for
+/// its axis then shows how far the free part moves. If that is far, the norm of C is estimated.
+/// \throw SingularStiffness if the condition is too large
 void CutStiffness::require_condition() {
   const double weakest = factor_->weakest_pivot();
   if (weakest > weak_pivot || weakest > 0.5 * accepted_pivot_)
@@ -238,7 +238,7 @@ CutWork CutStiffness::cut(std::shared_ptr<const Model> next, std::span<const std
       } catch (const Cancelled&) {
         throw;
       } catch (const Error&) {
-        // Singular, or nearly: a refactorisation tells.
+        // Singular, or nearly so: a refactorisation decides.
       }
     }
     woodbury_.reset();

@@ -1,7 +1,7 @@
 #pragma once
-// The stiffness of an object that is cut again and again: whatever is cheapest keeps its solutions
-// exact, and columns of a net as it came go on to serve. A solid's factor is refactored in part,
-// after K was assembled anew for the nodes of the elements that the cut has changed.
+// Stiffness of an object that is cut repeatedly. After each cut the cheapest method updates the
+// factor, so that solutions stay exact. Stored columns of the uncut net remain in use. A solid's
+// factor is refactored in part, after K was assembled again for the nodes of changed elements.
 
 #include "base/context.h"
 #include "compliance/compliance_source.h"
@@ -19,38 +19,43 @@
 
 namespace gewebe {
 
-/// How a cut was followed.
+/// Method that updates the stiffness after a cut.
 enum class CutWay : std::uint8_t {
   woodbury, ///< the factor stays, its solutions are corrected (Sherman–Morrison–Woodbury)
-  refactor, ///< partial refactorisation: the fronts that the cut reaches are computed again
-  fresh,    ///< everything is
+  refactor, ///< partial refactorisation: the fronts that the cut affects are computed again
+  fresh,    ///< all fronts are computed again
 };
 
+/// Work of an update.
 struct CutWork {
   CutWay way = CutWay::fresh;
-  bool unprepared = false; ///< the factor of the model before was made for it
+  bool unprepared = false; ///< the previous model had to be factorised first
   std::size_t rank = 0;    ///< for Woodbury, all cuts since the factor counted
   FrontalWork factor;      ///< of refactor and fresh
 };
 
+/// Factor of a model and its cuts.
 class CutStiffness {
 public:
-  /// Of a model that has not been cut. \param source of it, whose columns go on to serve, or null
+  /// Starts with a model that has not been cut.
+  /// \param source  of its compliance, whose columns remain in use; or null
   CutStiffness(std::shared_ptr<const Model> first, std::shared_ptr<const ComplianceSource> source,
                const Context& context);
 
-  /// Factorises the present model, so that the next cut need not. \throw as FrontalFactor
+  /// Factorises the present model in advance of the next cut. \throw as FrontalFactor
   void prepare();
 
-  /// Goes over to the model of the next cut; see CutModel for origin and place. Which way is taken
-  /// depends on the models alone, so that a run repeated is the same to the bit. \param way to
-  /// take; none: the cheapest
-  /// \throw SingularStiffness naming what moves freely, and as FrontalFactor; nothing serves then
+  /// Updates the stiffness to the model after the next cut; see CutModel for origin and place. The
+  /// choice of the method depends on the models only, so that repeated runs are the same to the
+  /// bit.
+  /// \param way  the method; empty: the cheapest
+  /// \throw SingularStiffness that names the free nodes; as FrontalFactor. The object is then
+  /// unusable
   CutWork cut(std::shared_ptr<const Model> next, std::span<const std::uint32_t> origin,
               std::span<const std::uint32_t> place, std::optional<CutWay> way = {});
 
-  /// The compliance of the present model, which serves until the next cut.
-  /// \pre a cut was made, or it was prepared
+  /// Compliance of the present model, valid until the next cut.
+  /// \pre cut() or prepare() was called
   std::shared_ptr<ComplianceSource> compliance() const;
 
 private:
@@ -74,7 +79,7 @@ private:
   double norm_ = 0;             ///< bound of ‖K‖₁
   double fresh_operations_ = 0; ///< of the last factor with an order of its own
   double reached_ = 0;          ///< operations of the last refactorisation
-  double accepted_pivot_ = 1; ///< the weakest for which the condition was found to be small enough
+  double accepted_pivot_ = 1;   ///< smallest pivot for which the condition was small enough
 };
 
 } // namespace gewebe

@@ -1,6 +1,6 @@
 #pragma once
-// The inner loop of corrected columns: a node's three columns take sums of the same vectors.
-// Compiled once per CPU level; every level gives the same bits, for there is no fused
+// Inner loop of corrected columns: sums of the same vectors for a node's three columns. It is
+// compiled once per CPU level. Every level gives the same bits, because there is no fused
 // multiplication and each row is summed in the order of the vectors.
 
 #include "base/cpu.h"
@@ -9,7 +9,8 @@
 
 namespace gewebe {
 
-/// Vectors are packed by so many rows: [tile][vector][row], the last tile filled up with zeros.
+/// Number of rows of a tile. Vectors are packed as [tile][vector][row]; the last tile is filled up
+/// with zeros.
 inline constexpr std::size_t response_tile = 16;
 
 /// sum[stride a + r] += Σ_k factor[3 k + a] vector_k[r] for a = 0, 1, 2 and the rows r < end of

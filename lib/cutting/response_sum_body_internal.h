@@ -1,5 +1,5 @@
 #pragma once
-// The body of response_sum_*.cpp, each of which compiles it for its instruction set.
+// Body of response_sum_*.cpp. Each of these files compiles it for its instruction set.
 
 #include "base/four_lanes.h"
 #include "cutting/response_sum.h"
@@ -9,7 +9,7 @@ namespace {
 
 inline constexpr std::size_t parts = response_tile / 4;
 
-/// Twelve sums stay in registers.
+/// Adds the vectors of a tile. Its twelve sums stay in registers.
 inline void add_tile(const double* tile, std::size_t count, const double* factor,
                      double* const (&sum)[3]) {
   Four total[3][parts];

@@ -1,21 +1,22 @@
 #pragma once
-// What a cut changes in a stiffness matrix: as few columns as the change has ranks.
+// Low-rank change of a stiffness matrix by a cut.
 //
 // Before the cut there are n nodes, K and C = K⁻¹; after it n' nodes, K' and C'. Each new node i'
-// is an old one or a copy of one, origin(i'); a copy sits where its origin does. With E (n' × n)
-// the displacements that give every copy those of its origin, springs that were only shared out
-// between copies pull as before. What K' E c leaves of the loads that c answers is then W w with
+// is an old one or a copy of one, origin(i'). A copy has the position of its origin. Let E (n' × n)
+// map displacements so that every copy gets those of its origin. Springs that were only shared out
+// between copies then pull as before. Let c be a column of C, the displacements under a load. The
+// part of this load that K' E c does not balance is W w:
 //
-//   w = Σ Qᵀ c,   so   C' P = E C - C' W Σ Qᵀ C   on columns, P c's loads at the kept copies, (1)
+//   w = Σ Qᵀ c,   so   C' P = E C - C' W Σ Qᵀ C   on columns,   (1)
 //
-// a column of W, Q and an entry of Σ for
+// with P c's loads at the kept copies. W, Q and Σ have a column, or an entry, for
 //   - each axis of each copy: it and the kept copy of its origin pull apart with what the copy's
 //     springs pull at it, W = e_copy - e_kept, Q = the copy's row of K' E, Σ = 1;
 //   - each spring whose stiffness, summed over copies, has changed (by -k where it was removed):
 //     W = Q = n(e_i - e_j), Σ the change; one column where the rest length is the length, otherwise
 //     up to three.
-// Nothing in it is a difference of large numbers. The rank is three for each copy and one for each
-// severed spring, however many springs the copies carry.
+// No term is a difference of large numbers. The rank is three for each copy and one for each
+// severed spring, independent of the number of springs at the copies.
 
 #include "base/context.h"
 #include "model/cut_origin.h"
@@ -29,8 +30,8 @@
 
 namespace gewebe {
 
-/// Solves for right-hand sides over all axes of a model, one behind the other, in place; forces on
-/// fixed axes are ignored, displacements there are 0. AxisSolver::solve does.
+/// Solves for right-hand sides over all axes of a model, one after the other, in place, as
+/// AxisSolver::solve. Forces on fixed axes are ignored, displacements there are 0.
 using AxesSolve = std::function<void(std::span<double> over_axes, std::size_t columns)>;
 
 /// Sparse rows, entries ascending by axis.
@@ -46,27 +47,30 @@ struct SparseRows {
   void add_to(std::size_t r, double factor, std::span<double> x) const;
 };
 
+/// Change of a stiffness matrix; see above for Σ, W and Q.
 struct StiffnessChange {
   std::size_t old_axes = 0, new_axes = 0; ///< 3 n, 3 n'
   std::vector<std::uint32_t> origin;      ///< by new node
   std::vector<std::uint32_t> place;       ///< by old node: the kept copy, or gone_node
   std::vector<std::uint32_t> touched; ///< new nodes whose rows of K' aren't those of K, ascending
-  std::size_t springs = 0;    ///< so many of the columns below are of springs, the first ones
+  std::size_t springs = 0;    ///< number of columns below that are of springs; these come first
   SparseRows load;            ///< Wᵀ: rows over new axes, 0 on fixed ones
   SparseRows answer;          ///< Qᵀ: rows over old axes, 0 on fixed ones
   std::vector<double> weight; ///< Σ
-  std::vector<std::uint32_t> copy_axis; ///< of the columns behind those of springs: new axes
-  SparseRows copy_block; ///< K' among copy_axis, whose indices stand in the place of axes
+  std::vector<std::uint32_t> copy_axis; ///< of the columns after those of springs: new axes
+  SparseRows copy_block;                ///< K' among copy_axis; `axis` has indices into copy_axis
 
   std::size_t rank() const noexcept { return weight.size(); }
   bool copy(std::uint32_t node) const { return place[origin[node]] != node; }
 };
 
-/// \param origin by node of `after` \param place by node of `before`: the copy that keeps its
-/// loads, or gone_node where the later model has none (a part that was cut free). Where place names
-/// a node that isn't there, the lowest copy stands in. \pre check_model passes for both \throw
-/// Error naming the node if `after` is not cut from `before`: copies lie elsewhere or are fixed
-/// otherwise than their origin, maps contradict each other
+/// Finds the change between a model and the cut one.
+/// \param origin  by node of `after`
+/// \param place  by node of `before`: the copy that keeps its loads, or gone_node if the later
+/// model has none (a part that was cut free). If the node does not exist, the lowest copy is used.
+/// \pre check_model passes for both
+/// \throw Error that names the node if `after` is not cut from `before`: a copy differs from its
+/// origin in position or constraints, or the maps contradict each other
 StiffnessChange stiffness_change(const Model& before, const Model& after,
                                  std::span<const std::uint32_t> origin,
                                  std::span<const std::uint32_t> place);
@@ -75,8 +79,8 @@ StiffnessChange stiffness_change(const Model& before, const Model& after,
 void copy_displacements(const StiffnessChange& change, std::span<const double> x,
                         std::span<double> on_new);
 
-/// C' W, one column behind the other: rank() solves of the new matrix, up to 24 at a time.
-/// \param solve of K'; called from several threads unless context.threads is 1
+/// C' W, column by column: rank() solves of the new matrix, up to 24 at a time.
+/// \param solve  of K'; called from several threads unless context.threads is 1
 /// \throw Error if memory exceeds the context's; Cancelled
 std::vector<double> change_response(const StiffnessChange& change, const AxesSolve& solve,
                                     const Context& context);

@@ -60,8 +60,8 @@ struct WoodburySolver::State {
       for (std::size_t k = change.copy_block.start[r]; k < change.copy_block.start[r + 1]; ++k)
         s(index(change.springs + r), index(change.springs + change.copy_block.axis[k])) +=
             change.copy_block.value[k];
-    // Springs count in mm/force, copies in force/mm: rows and columns are made alike in size by
-    // what was there before the responses were taken off, which a singular S is small against.
+    // Rows of springs have the unit mm/force, rows of copies force/mm. Rows and columns are scaled
+    // by their terms before the responses are subtracted. A singular S is small against these.
     scale.resize(index(rank));
     for (std::size_t r = 0; r < rank; ++r) {
       const double own = std::abs(change.answer.times(r, answer(r)));

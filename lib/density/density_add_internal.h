@@ -39,7 +39,7 @@ inline __m256 scaled_square(float center, __m256 inverse) {
   return _mm256_mul_ps(s, s);
 }
 
-/// Of a particle along the axes: 1 − sx², sy², and in each lane the least of its four sy².
+/// Squares for a particle along the axes: 1 − sx², sy², and in each lane the least of its four sy².
 struct Squares {
   __m256 rest_x, y2, nearest;
 };

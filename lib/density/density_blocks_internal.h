@@ -1,7 +1,7 @@
 #pragma once
-// From particles to the leaves that they reach: particles are sorted into cubic blocks of the
-// lattice (counting sort, in parallel), and each block goes down an octree on its own, so that the
-// lists of a leaf live only while its block is worked on.
+// Lists of the particles that reach each leaf. Particles are sorted into cubic blocks of the
+// lattice (counting sort, in parallel). Each block has an octree of its own, so that the lists of a
+// leaf exist only while its block is processed.
 
 #include "base/context.h"
 #include "density/density.h"

@@ -1,6 +1,6 @@
 #pragma once
-// What moves in time, whatever it consists of: nets (dynamics/elastodynamic.h) and solids
-// (dynamics/solid_dynamic.h). Each says how.
+// Interface of elastodynamic bodies: nets (dynamics/elastodynamic.h) and solids
+// (dynamics/solid_dynamic.h).
 
 #include "base/context.h"
 #include "base/error.h"
@@ -18,7 +18,7 @@
 
 namespace gewebe {
 
-/// The state of an object can't be continued.
+/// Error of an integration that can't continue.
 class MotionError : public Error {
 public:
   MotionError(std::uint32_t node, double time, const std::string& what)
@@ -31,19 +31,20 @@ private:
   double time_;
 };
 
-/// What solids, and nets that move implicitly, took to move.
+/// Work of implicit integration, of solids and of nets.
 struct SolidStepCounts {
-  std::uint64_t steps = 0, rounds = 0; ///< of integration; solutions with a factor in them
-  std::uint64_t factors = 0;
-  std::uint64_t unfinished = 0; ///< steps whose rounds ran out
-  std::uint64_t limited = 0;    ///< steps whose speeds were lowered, see SolidMotion::step
-  double seconds = 0;           ///< by the clock
+  std::uint64_t steps = 0, rounds = 0; ///< integration steps; linear solves in them
+  std::uint64_t factors = 0;           ///< factorisations
+  std::uint64_t unfinished = 0;        ///< steps that ran out of iterations
+  std::uint64_t limited = 0;           ///< steps whose speeds were lowered, see SolidMotion::step
+  double seconds = 0;                  ///< by the clock
 };
 
 struct MotionEnergies {
   double kinetic = 0, elastic = 0; ///< 1e-9 J
 };
 
+/// State of motion of one body, and its integration.
 class BodyMotion {
 public:
   BodyMotion() = default;
@@ -51,57 +52,66 @@ public:
   BodyMotion& operator=(const BodyMotion&) = delete;
   virtual ~BodyMotion() = default;
 
-  /// What acts from now on. Displaced nodes stand where they must at once. An unchanged load wakes
-  /// nobody. \pre nodes exist, no displacement along an axis that the model holds
+  /// Sets the load from now on. Displaced nodes get their displacement at once. An unchanged load
+  /// does not wake the object.
+  /// \pre nodes exist, no displacement along an axis that the model holds
   virtual void set_load(const Load& load, double time) = 0;
 
-  /// Integrates from `start` over `duration` in equal steps of at most `largest_step`. An object
-  /// that rests (see resting()) takes none. \return steps taken
+  /// Integrates from `start` over `duration` in equal steps of at most `largest_step`. An object at
+  /// rest (see resting()) makes no step. \return number of steps
   /// \pre duration >= 0, largest_step > 0, start >= 0
-  /// \throw Error if there would be over 1e9 steps; MotionError that names the node and the time
-  /// where the state is no longer finite, or an implicit step has no solution; Cancelled
+  /// \throw Error if there would be over 1e9 steps
+  /// \throw MotionError with node and time, if the state is no longer finite or an implicit step
+  /// has no solution
+  /// \throw Cancelled
   virtual std::uint64_t advance(double duration, double largest_step, const Context& context,
                                 double start) = 0;
 
-  /// Whether the object was found at rest; so it stays until its load changes.
+  /// Whether the object was found at rest. It stays at rest until its load changes.
   virtual bool resting() const noexcept = 0;
   virtual void wake() = 0;
 
-  /// By node of the model. \pre not from two threads at once
+  /// State of each node of the model. \pre not called from two threads at once
   virtual std::span<const NodeMotion> motion() const = 0;
-  /// Gives the nodes another state; it wakes. \pre as many as nodes; 0 where the model holds them
+  /// Sets the state of all nodes, and wakes the object.
+  /// \pre one entry for each node; 0 along axes that the model holds
   virtual void set_motion(std::span<const NodeMotion> motion) = 0;
 
-  /// All that decides how it goes on, but for what is kept to be quick (see renew), and back.
+  /// Everything that determines the future motion, without caches (see renew).
   virtual std::any snapshot() const = 0;
-  /// \pre a snapshot of this object
+  /// Rolls back to a snapshot. \pre a snapshot of this object
   virtual void go_back(const std::any& snapshot) = 0;
-  /// Forgets what is kept to be quick: factors, guesses.
+  /// Drops caches: factors, first guesses.
   virtual void renew() = 0;
 
-  /// What holds the displaced nodes: the force on the object, per node in ascending order; 0 along
+  /// Reactions of the displaced nodes: the force on the object, per node in ascending order; 0
+  /// along
   /// axes that the model holds.
   virtual std::vector<NodeVector> contact_forces() const = 0;
 
   // ---- contact
 
-  /// Whether it can make steps with contact.
+  /// Whether the object can make steps with contact.
   virtual bool has_contact_steps() const { return false; }
   /// Its collision surface, by nodes of the model. \pre has_contact_steps()
   virtual const contact::ModelSurface& collision_surface();
-  /// Begins a step with contact. A step that was begun and not ended leaves no trace.
-  /// \return valid until the step ends \pre has_contact_steps(), to > from \throw as advance
+  /// Begins a step with contact. A step that is not ended has no effect.
+  /// \return body for the contact solver, valid until the step ends
+  /// \pre has_contact_steps(), to > from
+  /// \throw as advance
   virtual contact::ContactBody& begin_contact_step(double from, double to, const Context& context);
-  /// Ends it. \param forces  contact forces on vertices, by ascending vertex
-  /// \param still  velocities stay as they were, and so does the time
+  /// Ends the step.
+  /// \param forces  contact forces on vertices, by ascending vertex
+  /// \param still  velocities and time stay as they were
   virtual void end_contact_step(std::span<const contact::VertexForce> forces, bool still,
                                 const Context& context);
-  /// A step without contact came behind steps with it.
+  /// To be called for a step without contact: drops the contact forces of the last step.
   virtual void clear_contact() {}
 
-  /// Of what moves by the steps of solids, since the last call.
+  /// Work of implicit integration since the last call.
   virtual SolidStepCounts take_counts() { return {}; }
-  /// Of the same; those of a net that moves explicitly are sums over its springs.
+  /// Energies of a body with implicit steps. Empty for explicit steps: elastic_energy sums over the
+  /// springs.
   virtual std::optional<MotionEnergies> energies() const { return std::nullopt; }
 };
 

@@ -1,13 +1,13 @@
 #pragma once
-// The elastodynamic method: masses and springs in time (report 3.1.3).
+// Elastodynamic method: integration of masses and springs (report 3.1.3).
 //
 // Semi-implicit Euler, with all F of the old state:
 //
 //   v' = v + h/m (F(u, v) + f + m g),   u' = u + h v'.
 //
-// Models too stiff for that move by the steps of solids (dynamics/solid_dynamic.h). Axes that the
-// model holds stay, a displaced node stands at its displacement with velocity 0, or is on its way
-// there. The same bytes for any number of threads.
+// Models that are too stiff for this use the implicit steps of solids (dynamics/solid_dynamic.h).
+// Axes that the model holds do not move. A displaced node stands at its displacement with velocity
+// 0, or is on its way there. Results are the same bytes for any number of threads.
 
 #include "base/context.h"
 #include "base/copy_on_write.h"
@@ -31,9 +31,10 @@ namespace gewebe {
 /// model at rest alone.
 inline constexpr double safe_step_fraction = 0.9;
 
+/// Explicit integration of a net.
 class Elastodynamic final : public BodyMotion {
 public:
-  /// At rest. Keeps a reference to the model.
+  /// Starts at rest. Keeps a reference to the model.
   /// \pre check_model(model) passes   \throw Error if a node can move but has no mass
   explicit Elastodynamic(const Model& model);
 
@@ -41,15 +42,15 @@ public:
   std::uint64_t advance(double duration, double largest_step, const Context& context,
                         double start = 0) override;
 
-  /// At rest it has no speed, and acceleration (times the square of the step) under 1e-15 of its
-  /// size.
+  /// The object is at rest if its velocity is zero, and its acceleration times the square of the
+  /// step is less than 1e-15 of its size.
   bool resting() const noexcept override { return resting_; }
   void wake() override { resting_ = false; }
 
   std::span<const NodeMotion> motion() const override;
   void set_motion(std::span<const NodeMotion> motion) override;
 
-  /// What a snapshot holds.
+  /// Contents of a snapshot.
   struct State {
     std::shared_ptr<const Load> load;
     double time = 0, loaded = 0;
@@ -64,7 +65,7 @@ public:
   void go_back(const std::any& snapshot) override {
     restore(std::any_cast<const State&>(snapshot));
   }
-  void renew() override {} // nothing is kept
+  void renew() override {} // there are no caches
 
   std::vector<NodeVector> contact_forces() const override;
 
@@ -105,7 +106,7 @@ private:
   double loaded_ = 0; ///< when the load was last applied
   std::vector<NodeTraits> traits_;
   CopyOnWrite<std::vector<NodeRow>> rows_, next_;
-  std::vector<Drive> drives_; ///< by block; empty where nothing changes
+  std::vector<Drive> drives_; ///< by block; empty if all loads of the block are constant
   mutable std::vector<NodeMotion> motion_;
   mutable bool motion_shown_ = false; ///< motion_ is that of rows_
   double size_ = 0;                   ///< longest side of the box at rest

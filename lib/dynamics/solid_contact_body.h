@@ -1,6 +1,7 @@
 #pragma once
-// A solid or a net that moves implicitly, in a step of contact: the compliance of the models of
-// solid/solid_motion.h, in frames that turn with the nodes or that of space.
+// A solid, or a net with implicit steps, as the contact solver sees it. Its compliance is that of
+// the quadratic models of solid/solid_motion.h, in frames that rotate with the nodes or in the
+// fixed frame.
 
 #include "base/context.h"
 #include "contact/contact_body.h"
@@ -15,6 +16,7 @@
 
 namespace gewebe {
 
+/// Contact body of one SolidMotion.
 class SolidContactBody final : public contact::ContactBody {
 public:
   /// \param vertices  nodes of the collision surface, ascending. Keeps references to all.
@@ -22,7 +24,8 @@ public:
                    std::size_t nodes)
       : motion_(motion), vertices_(vertices), axes_(3 * nodes) {}
 
-  /// A step begins. \pre SolidMotion::begin_step \param last  forces at the end of the last step
+  /// Begins a step. \pre SolidMotion::begin_step was called
+  /// \param last  forces at the end of the last step
   /// \param typical  force, and stiffness without inertia, see ContactBody
   void begin(double h, std::vector<contact::VertexForce> last,
              const contact::TypicalContact& typical, const Context& context);
@@ -65,7 +68,7 @@ private:
   std::vector<contact::VertexForce> last_;
   std::vector<double> step_, forces_;
   std::vector<double> linearised_; ///< forces of the quadratic model's state, 3 n
-  /// Unit responses with a matrix.
+  /// Responses to unit forces with one matrix.
   struct Columns {
     std::uint64_t version = 0;
     /// By vertex: at all vertices in their frames, three columns of 3 numbers.

@@ -20,20 +20,20 @@ namespace gewebe {
 namespace {
 
 constexpr double rest_tolerance = 1e-9, rest_rounding = 1e-13;
-/// In contact, mm/s: what sticks creeps with up to contact::Parameters::stick_speed, of which this
-/// is a tenth.
+/// In contact, mm/s: a tenth of contact::Parameters::stick_speed, the largest creep of sticking
+/// vertices.
 constexpr double rest_in_contact = 1e-2;
 constexpr int quiet_steps = 2;
 constexpr double same_step = 1e-9; ///< lengths that differ by less are one
 constexpr double max_steps = 1e9;
 constexpr double largest_force = 1e38; ///< squares of what it does are finite
 constexpr double same_mass = 1e-6;
-/// Rounds of a step whose tolerance is asked for.
+/// Largest number of iterations of a step with a given tolerance.
 constexpr int rounds_for_tolerance = 200;
-/// With springs, whose part of the constant matrix is a bound and not a tangent.
+/// The same with springs, whose part of the constant matrix is a bound and not a tangent.
 constexpr int rounds_with_springs = 40;
 
-/// Of a step of a net, where none is asked for: forces of springs are as rough as their model.
+/// Default tolerance of a step of a net: spring forces are as rough as their model.
 constexpr double tolerance_of_nets = 0.02;
 
 bool about(double value, double expected) {

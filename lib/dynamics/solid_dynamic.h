@@ -1,13 +1,13 @@
 #pragma once
-// The elastodynamic method of a solid, a model of tetrahedra, perhaps with springs beside them, and
-// of a net of springs alone that is too stiff for explicit steps: they move by the implicit steps
-// of solid/solid_motion.h, under what acts on objects of a scene.
+// Implicit integration of solids, and of nets that are too stiff for explicit steps. A solid is a
+// model with tetrahedra, perhaps with springs beside them. The steps are those of
+// solid/solid_motion.h, under the loads of a scene.
 //
-// Nodes have the masses of their tetrahedra and the model's drag per mass; weight acts by the loads
-// that statics has (weight_of), so that at rest a solid stands where statics says. Forces and
-// pressures of a step are those at its end, pressures on the shape at its beginning. Displaced
-// nodes stand at their displacement, or are on their way there. In an island it takes part in steps
-// with contact (contact/step.h). The same bytes for any number of threads.
+// Nodes have the masses of their tetrahedra and the model's drag per mass. Weight acts by the same
+// nodal loads as in statics (weight_of), so that a solid at rest has its static shape. Forces and
+// pressures of a step are those at its end; pressures act on the shape at its beginning. Displaced
+// nodes stand at their displacement, or are on their way there. In an island the object takes part
+// in steps with contact (contact/step.h). Results are the same bytes for any number of threads.
 
 #include "base/context.h"
 #include "base/copy_on_write.h"
@@ -28,20 +28,23 @@
 
 namespace gewebe {
 
+/// Implicit integration of one body.
 class SolidDynamic final : public BodyMotion {
 public:
-  /// At rest. Keeps a reference to the model.
-  /// \pre check_model(model) passes \throw Error if a node can move but has no mass, or, in a
-  /// model with tetrahedra, is in none of them and of no spring, or has another mass than its
-  /// tetrahedra's; as SolidMotion
+  /// Starts at rest. Keeps a reference to the model.
+  /// \pre check_model(model) passes
+  /// \throw Error if a node can move but has no mass
+  /// \throw Error if a node of a model with tetrahedra belongs to no tetrahedron and no spring, or
+  /// if its mass differs from that of its tetrahedra
+  /// \throw Error as SolidMotion
   SolidDynamic(const Model& model, const SolidChoice& choice, const Context& context);
 
   void set_load(const Load& load, double time) override;
   std::uint64_t advance(double duration, double largest_step, const Context& context,
                         double start = 0) override;
 
-  /// At rest two steps in a row moved nothing by more than 1e-9 of the largest displacement, or
-  /// 1e-13 of its size.
+  /// The object is at rest if two steps in a row moved no node by more than 1e-9 of the largest
+  /// displacement, or 1e-13 of the object's size.
   bool resting() const noexcept override { return state_.resting; }
   void wake() override { state_.resting = false; }
 
@@ -65,14 +68,14 @@ public:
   std::optional<MotionEnergies> energies() const override;
 
 private:
-  /// What a snapshot holds.
+  /// Contents of a snapshot.
   struct State {
     std::shared_ptr<const Load> load = std::make_shared<const Load>();
     double time = 0;
     CopyOnWrite<std::vector<double>> places{}, velocity{}, reactions{}; ///< 3 n
     MotionEnergies energies;
     std::uint64_t version = 0; ///< of all these
-    int quiet = 0;             ///< steps in a row that moved next to nothing
+    int quiet = 0;             ///< number of steps in a row with almost no motion
     bool resting = false;
 
     /// Contact forces at the end of the last step, by ascending vertex.
@@ -93,7 +96,7 @@ private:
 
   const Model& model_;
   SolidMotionOptions options_;
-  double bulk_ = 0; ///< of what fills a net; 0: nothing
+  double bulk_ = 0; ///< bulk modulus of the filling of a net; 0: not filled
   Context context_;
   double size_ = 0; ///< longest side of the box at rest
   State state_;
@@ -102,7 +105,7 @@ private:
   // Of the load.
   std::vector<std::uint8_t> held_; ///< 3 n
   bool all_held_ = false;
-  std::optional<Vec3> weighed_; ///< gravity that weight_ is of
+  std::optional<Vec3> weighed_; ///< gravity of weight_
   std::vector<double> weight_, steady_;
   std::vector<PressedCorner> pressed_;
 
@@ -111,9 +114,9 @@ private:
   std::optional<contact::ModelSurface> surface_;
   std::optional<contact::TypicalContact> typical_; ///< of the model
   std::unique_ptr<SolidContactBody> body_;         ///< of the engine
-  std::unique_ptr<contact::HeldBody> held_body_;   ///< where all nodes are held
+  std::unique_ptr<contact::HeldBody> held_body_;   ///< if all nodes are held
   std::vector<double> load_;                       ///< forces of the step, 3 n
-  std::vector<double> target_; ///< displacements at its end where all nodes are held
+  std::vector<double> target_; ///< displacements at its end, if all nodes are held
   double from_ = 0, to_ = 0;   ///< of the step with contact that was begun
   SolidStepCounts counts_;
   mutable std::vector<NodeMotion> motion_;

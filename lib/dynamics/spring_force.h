@@ -1,9 +1,9 @@
 #pragma once
-// The forces of a model of masses and springs, and what they conserve (report 3.1.3).
+// Forces of a model of masses and springs, and their conserved quantities (report 3.1.3).
 //
-// With e = l - rest and n from i to j a spring pulls node i by [k e + c (v_j - v_i)·n] n and node j
-// by exactly the opposite, bit for bit; drag brakes a node by -d v. A spring whose ends are at one
-// place (within 1e-150 mm) has no direction and pulls nobody.
+// With e = l - rest and n from i to j, a spring pulls node i by [k e + c (v_j - v_i)·n] n and node
+// j by exactly the opposite, bit for bit. Drag brakes a node by -d v. A spring whose ends coincide
+// (within 1e-150 mm) has no direction and exerts no force.
 
 #include "base/vec3.h"
 #include "model/model.h"
@@ -21,8 +21,8 @@ struct NodeMotion {
   Vec3 displacement, velocity;
 };
 
-/// A model's springs, node by node: those of node i are halves[first[i] … first[i+1]), in the
-/// model's order.
+/// Springs of a model, by node. Those of node i are halves[first[i] … first[i+1]), in the model's
+/// order.
 struct SpringNetwork {
   struct Half {
     std::uint32_t other = 0;

@@ -1,6 +1,6 @@
 #pragma once
-// The inner loop of elastodynamics: forces of a block's springs, then one step of its nodes.
-// Compiled once per CPU level; every level gives the same bits, for there is no fused
+// Inner loop of the elastodynamic method: forces of a block's springs, then one step of its nodes.
+// It is compiled once per CPU level. Every level gives the same bits, because there is no fused
 // multiplication and each sum has one fixed order.
 
 #include <cstddef>
@@ -14,20 +14,20 @@ struct alignas(64) NodeRow {
   double u[4], v[4];
 };
 
-/// Where a node rests (mm); the fourth number is 0.
+/// Rest position of a node (mm); the fourth number is 0.
 struct alignas(32) NodeRest {
   double p[4];
 };
 
-/// What acts on a node beside springs, and how it answers.
+/// Load, drag and mass of a node.
 struct alignas(64) NodeTraits {
   double constant[3]; ///< f + m g
   double drag;
   double inverse_mass[4]; ///< 0 along axes that can't move; the fourth number is 0
 };
 
-/// Four springs side by side. A spring of a shorter group's end joins a node to itself and pulls
-/// nobody.
+/// Four springs for SIMD. A group of fewer springs is filled up with springs that join a node to
+/// itself and exert no force.
 struct alignas(64) SpringGroup {
   double stiffness[4], damping[4], rest[4];
   std::uint32_t i[4], j[4]; ///< rows, by their NodeRest in bytes from the first one
@@ -45,7 +45,7 @@ struct SpringBlock {
 
 inline constexpr std::size_t largest_block = 256;
 
-/// Of a length in mm², below which a spring has no direction.
+/// Square of a length, mm², below which a spring has no direction.
 inline constexpr double min_square = 1e-300;
 
 /// v' = v + h (constant - drag v + F) / m, u' = u + h v' for the rows of the block; F sums the

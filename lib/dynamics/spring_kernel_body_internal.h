@@ -1,5 +1,5 @@
 #pragma once
-// The body of spring_kernel_*.cpp, each of which compiles it for its instruction set.
+// Body of spring_kernel_*.cpp. Each of these files compiles it for its instruction set.
 
 #include "dynamics/spring_kernel.h"
 
@@ -18,7 +18,7 @@ inline Four& four(double* at) { // NOLINT(readability-non-const-parameter)
   return *reinterpret_cast<Four*>(at);
 }
 
-/// Of non-negative numbers, rounded correctly.
+/// Square roots of non-negative numbers, rounded correctly.
 inline void square_root(const Four& x, Four& root) {
 #if defined(__AVX__)
   root = _mm256_sqrt_pd(x);
@@ -33,7 +33,7 @@ struct Three {
   Four x, y, z;
 };
 
-/// Four rows (x, y, z, 0) to four x, four y, four z.
+/// Transposes four rows (x, y, z, 0) to four x, four y, four z.
 inline void columns(const Four& a, const Four& b, const Four& c, const Four& d, Three& to) {
   const Four ac = __builtin_shufflevector(a, b, 0, 4, 2, 6); // ax bx az bz
   const Four ay = __builtin_shufflevector(a, b, 1, 5, 3, 7); // ay by . .
@@ -69,15 +69,16 @@ inline double* at(NodeRow* base, std::uint64_t offset) {
   return reinterpret_cast<double*>(reinterpret_cast<char*>(base) + 2 * offset);
 }
 
-/// From one row to another: at rest and what displacements add; and the velocity.
+/// Difference of positions of two rows, as that at rest plus that of the displacements; and that of
+/// their velocities.
 inline void between(const NodeRest* rest, const NodeRow* now, std::uint64_t i, std::uint64_t j,
                     Four& along, Four& speed) {
   along = (four(at(rest, j)) - four(at(rest, i))) + (four(at(now, j)) - four(at(now, i)));
   speed = four(at(now, j) + 4) - four(at(now, i) + 4);
 }
 
-/// A group alone is a chain of a hundred cycles, a fifth of them in the divider. Groups overlap
-/// best when each stage of one stands beside the other stages of those before it.
+/// Software pipeline. One group has a latency of a hundred cycles, a fifth of them in the divider.
+/// Groups overlap best if each stage of a group runs beside the other stages of earlier groups.
 inline constexpr std::size_t apart = 4;
 inline constexpr std::size_t underway = 2 * apart; ///< a power of two
 
@@ -101,7 +102,7 @@ inline void measure(const SpringGroup& g, const NodeRest* rest, const NodeRow* n
   along = d;
 }
 
-/// The pull over the length, of spring_force().
+/// Force over length of each spring, as in spring_force().
 inline void pull_of(const SpringGroup& g, const Four& square, Four& rate) {
   Four length;
   square_root(square, length);

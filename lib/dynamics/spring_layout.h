@@ -1,8 +1,8 @@
 #pragma once
-// A model's springs in the order in which they are fastest to sum: nodes that are near each other
-// in space lie near each other in memory, in blocks that fit the nearest cache. A spring within a
-// block is computed once, one between blocks once for either end, so that blocks can be stepped in
-// any order, by any number of threads, with the same bytes.
+// Memory layout of a model's springs for fast sums. Nodes that are near each other in space lie
+// near each other in memory, in blocks that fit the L1 cache. A spring within a block is computed
+// once, a spring between blocks once for each end. Blocks can therefore be stepped in any order, by
+// any number of threads, with the same bytes.
 
 #include "dynamics/spring_kernel.h"
 #include "model/model.h"
@@ -30,8 +30,8 @@ struct SpringLayout {
   std::uint64_t pulls() const; ///< forces of springs that a step computes
 };
 
-/// Blocks by recursive bisection of the rest positions along the longest side. The same result on
-/// every machine. \pre check_model(model) passes
+/// Forms blocks by recursive bisection of the rest positions along the longest side. The result is
+/// the same on every machine. \pre check_model(model) passes
 SpringLayout spring_layout(const Model& model);
 
 } // namespace gewebe

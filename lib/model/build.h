@@ -32,19 +32,18 @@ struct BuildOptions {
   bool operator==(const BuildOptions&) const = default;
 };
 
-/// What had to be left out or mended, and what the mesh is like.
+/// Elements of the mesh that were left out or mended, and properties of the mesh.
 struct BuildReport {
   std::size_t isolated_points = 0;   ///< points of no face: left out
   std::size_t degenerate_faces = 0;  ///< faces with two equal corners: left out
   std::size_t duplicate_faces = 0;   ///< faces with the same corners as an earlier one: left out
-  std::size_t zero_length_edges = 0; ///< edges between different points at one place: no spring
+  std::size_t zero_length_edges = 0; ///< edges between coincident points: no spring
   std::size_t light_nodes = 0;       ///< nodes raised to 1/1000 of the mean mass
   std::size_t slack_springs = 0;     ///< edge springs with stiffness 0, between faces without area
   std::size_t boundary_edges = 0;    ///< edges of one face
   std::size_t nonmanifold_edges = 0; ///< edges of more than two faces
 
-  /// Each count under its name; `warning` says what it means ("faces that stand twice were left
-  /// out") where a user should hear of it.
+  /// A count with its name; `warning` is the text for the user if the count needs a warning.
   struct Line {
     const char* key;
     std::size_t count;
@@ -58,28 +57,32 @@ struct BuiltModel {
   BuildReport report;
 };
 
-/// Nodes are the mesh's points in its order, then central nodes. Edge springs are the mesh's unique
-/// edges with k = E h ΣA / l² summed over their faces (Van Gelder 1998), bending springs join the
-/// corners opposite an edge of two faces where no edge joins them, central springs tie each node to
-/// the nearest central node of its component: k = 1000 F s A_i / A, where A_i is a third of the
-/// faces at the node, A the component's area and s = √3/2 E h, an edge spring's stiffness in a net
-/// of equilateral triangles, or the stiffness that is given. So a surface is held as firmly per
-/// area by few nodes as by many. Rest lengths are distances. A spring damps with c = 2 ζ √(k μ),
-/// μ = m_i m_j / (m_i + m_j), or the other's mass where one end is fixed along all axes, ζ the mean
-/// of its nodes' materials. The same result for any number of threads. \pre check_mesh(mesh) passes
+/// Builds a model from a mesh. Nodes are the mesh's points in its order, then central nodes.
+///
+/// Edge springs are the mesh's unique edges with k = E h ΣA / l² summed over their faces (Van
+/// Gelder 1998). Bending springs join the corners opposite an edge of two faces, unless an edge
+/// joins them. Central springs tie each node to the nearest central node of its component: k = 1000
+/// F s A_i / A. A_i is a third of the area of the faces at the node, A the component's area, F the
+/// central factor. s is the given stiffness, or √3/2 E h, that of an edge spring in a net of
+/// equilateral triangles. The stiffness per area therefore does not depend on the number of nodes.
+///
+/// Rest lengths are distances. A spring damps with c = 2 ζ √(k μ), μ = m_i m_j / (m_i + m_j), or
+/// the other's mass if one end is fixed along all axes; ζ is the mean of its nodes' materials. The
+/// result is the same for any number of threads. \pre check_mesh(mesh) passes
 /// \throw Error if there is no usable triangle or a result is not finite; Cancelled
 BuiltModel build_model(const TriangleMesh& mesh, const BuildOptions& options,
                        const Context& context);
 
-/// Bytes that build_model needs at its peak.
+/// Peak memory of build_model, bytes.
 double model_bytes(double points, double triangles, bool bend);
 
-/// Places for at most `count` central nodes for these points, and the nearest of them for each
-/// point: seeds by farthest points, the first the one farthest from the mean, then Lloyd's
-/// iteration until nothing changes or for 100 rounds. Seeds as far but for a hundredth of their
-/// distance are chosen by their places, other ties go to the lowest index. No place is without a
-/// point. Means are weighted where `weights` has a number > 0 for each point, so that the places do
-/// not follow the finer part of a net.
+/// Positions of at most `count` central nodes for these points, and the nearest one for each point.
+///
+/// Seeds are farthest points; the first is farthest from the mean. Lloyd's iteration follows, until
+/// nothing changes or for 100 rounds. Seeds whose distances agree to a hundredth are chosen by
+/// their positions; other ties go to the lowest index. Each center has a point. Means are weighted
+/// if `weights` has a number > 0 for each point, so that the centers do not depend on local
+/// refinement of a net.
 struct Clusters {
   std::vector<Vec3> centers;
   std::vector<std::uint32_t> of_point;
@@ -87,7 +90,8 @@ struct Clusters {
 Clusters cluster_points(const std::vector<Vec3>& points, std::size_t count, const Context& context,
                         std::span<const double> weights = {});
 
-/// The nearest of these centers for each point, ties to the lowest; centers that are none's go.
+/// The nearest of these centers for each point, ties to the lowest. Centers without a point are
+/// removed.
 Clusters nearest_clusters(const std::vector<Vec3>& points, const std::vector<Vec3>& centers,
                           const Context& context);
 

@@ -77,9 +77,11 @@ std::vector<Vec3> farthest_points(const std::vector<Vec3>& points, std::size_t c
   return seeds;
 }
 
-/// Ties the points to their nearest centers, of equal ones the first. `others` says of each point
-/// what no center but its own can be nearer than, less `moved`, by which each has moved at most
-/// since; points that this decides are not compared with all. \return whether a tie changed
+/// Assigns the points to their nearest centers; ties go to the first.
+/// \param others  by point: lower bound of its distance to other centers than its own, before the
+/// centers moved; points for which it decides are not compared with all centers
+/// \param moved  largest displacement of a center since
+/// \return whether an assignment changed
 bool assign(const std::vector<Vec3>& points, Clusters& clusters, std::span<double> others,
             double moved, const Context& context) {
   std::vector<std::uint8_t> changed(points.size() / grain + 1);

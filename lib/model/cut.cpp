@@ -515,7 +515,7 @@ private:
   std::vector<double> area_;                         ///< by triangle of the part
   std::vector<std::uint32_t> node_at_;               ///< by corner: its node now
   std::map<std::uint32_t, std::vector<Piece>> fans_; ///< of doubled nodes, what keeps it first
-  std::vector<std::uint32_t> copies_;                ///< of which node
+  std::vector<std::uint32_t> copies_;                ///< by copy: its node
   std::vector<Spring> moved_;                        ///< with ends that they had not before
   CutModel result_;
 };

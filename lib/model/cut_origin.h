@@ -1,5 +1,5 @@
 #pragma once
-// Where the nodes of a cut model come from, found again from the two models alone.
+// Reconstruction of the origins of a cut model's nodes from the models before and after the cut.
 
 #include "model/model.h"
 
@@ -16,10 +16,12 @@ struct CutOrigin {
   std::vector<std::uint32_t> place;  ///< by node of the earlier: its number now, or gone_node
 };
 
-/// A node comes from the old one at exactly its place: of several, from that of its own number,
-/// else from the one that has most springs to the same places, else from the lowest. An old node is
-/// now the new one of its number if that comes from it, else the lowest that does. \throw Error
-/// naming a node that is where no old one is, so that the later model isn't cut from the earlier
+/// Finds origins and places by position. A node's origin is the old node at exactly its position.
+/// If there are several, it is the one of the same number, else the one with most springs to the
+/// same positions, else the lowest. The place of an old node is the new node of its number if that
+/// comes from it, else the lowest one that does.
+/// \throw Error that names a node at the position of no old one: the later model isn't cut from the
+/// earlier
 CutOrigin find_cut_origin(const Model& before, const Model& after);
 
 } // namespace gewebe

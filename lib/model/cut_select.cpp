@@ -234,7 +234,7 @@ private:
   /// as standing where its neighbour there does. So the rim has no teeth that hang loosely. Returns
   /// whether there was any.
   bool move_teeth(const std::vector<std::size_t>& opened) {
-    std::map<std::uint32_t, std::pair<int, std::uint32_t>> teeth; // opened edges, who is across
+    std::map<std::uint32_t, std::pair<int, std::uint32_t>> teeth; // opened edges, triangle across
     for (const std::size_t e : opened) {
       const auto around = edges_.around(e);
       if (around.size() != 2)

@@ -1,12 +1,12 @@
 #pragma once
-// What a cut severs: springs between nodes, a plane, the area that a blade sweeps, springs that
-// tear.
+// Selection of springs and edges for a cut: springs between nodes, a plane, the area that a blade
+// sweeps, springs that tear.
 //
-// A triangle is on the side of the area on which its middle lies. Edges between triangles of
-// different sides come apart where their midpoints project into the area. A triangle that would
-// hang by one edge goes to the other side, which leaves a rim without loose teeth. A spring without
-// a triangle is severed if it pierces the area; of a node with triangles it starts in their
-// middles, for the node itself stands on the cut.
+// A triangle is on the side of its centre. Edges between triangles of different sides are opened if
+// their midpoints project into the area. A triangle that would hang by one edge goes to the other
+// side, so that the rim has no loose teeth. A spring without a triangle is severed if it pierces
+// the area. At a node with triangles it starts in their centres, because the node itself is on the
+// cut.
 
 #include "model/cut.h"
 #include "model/model.h"
@@ -30,21 +30,21 @@ struct CutPlane {
   bool operator==(const CutPlane&) const = default;
 };
 
-/// Where the plane passes through the model at rest; with `nodes` (ascending, not empty) only edges
-/// with both ends among them, and springs to central nodes from these. \throw Error if it misses
+/// Cut by a plane through the model at rest; with `nodes` (ascending, not empty) only of edges with
+/// both ends among them, and of springs from these to central nodes.
+/// \throw Error if the plane misses the model
 Cut plane_cut(const Model& model, const CutPlane& plane, std::span<const std::uint32_t> nodes);
 
-/// Corners of an area, one after the other round it.
+/// Corners of an area, in order.
 using SweptQuad = std::array<Vec3, 4>;
 
-/// What lies in the areas when nodes are displaced from rest by these 3 n numbers (none: not); may
-/// be empty.
+/// Cut by areas, with nodes displaced from rest by 3 n numbers (empty: at rest). It may be empty.
 Cut swept_cut(const Model& model, std::span<const double> displacement,
               std::span<const SweptQuad> areas);
 
-/// What gives way where springs are longer than (1 + strain) times their rest length. An edge of
-/// the surface opens the surface at that end where springs pull more, across itself; where it
-/// can't, it is removed, and so are other springs. May be empty. \pre strain > 0
+/// Tears at springs that are longer than (1 + strain) times their rest length. An edge of the
+/// surface opens the surface across itself, at the end with the larger pull of springs. If that is
+/// impossible the edge is removed; other springs are removed too. It may be empty. \pre strain > 0
 Cut torn_cut(const Model& model, std::span<const double> displacement, double strain);
 
 } // namespace gewebe

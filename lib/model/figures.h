@@ -1,5 +1,5 @@
 #pragma once
-// What there is to count in a model.
+// Counts of a model for statistics.
 
 #include "base/context.h"
 #include "model/model.h"

@@ -1,5 +1,5 @@
 #pragma once
-// Components that what is fixed holds, but not in every way.
+// Check for mechanisms: components whose fixed nodes leave a rigid motion.
 
 #include "model/model.h"
 
@@ -9,16 +9,17 @@
 
 namespace gewebe {
 
-/// A component of which some rigid motions are held and some are not.
+/// A component with some rigid motions held and some free.
 struct Hinged {
   std::uint32_t component = 0;
   std::size_t nodes = 0; ///< of its surface
-  std::size_t held = 0;  ///< nodes that something fixes, central ones among them
+  std::size_t held = 0;  ///< fixed nodes, central ones included
 };
 
-/// Components with a fixed central node whose fixed nodes, those of the surface among them, leave a
-/// rigid motion: one place, or places on one line, within a millionth of the component's size. What
-/// nothing holds is free on purpose and not among them. \pre check_model(model) passes
+/// Finds components with a fixed central node whose fixed nodes (those of the surface included)
+/// leave a rigid motion: they have one position, or lie on one line, within a millionth of the
+/// component's size. Components without fixed nodes are free on purpose, and left out.
+/// \pre check_model(model) passes
 std::vector<Hinged> hinged_components(const Model& model);
 
 } // namespace gewebe

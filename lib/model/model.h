@@ -5,24 +5,24 @@
 //
 // Nodes 0 … S-1 are those of the surface (and of the interior, where there are tetrahedra), in mesh
 // order; nodes S … N-1 are central nodes, to which surface nodes are tied so that the object moves
-// and turns as a whole. Invariants, which `check_model` verifies:
-//   - there is a material and a node; every number is finite; names hold no `"`, `#` or control
-//   character
-//   - density, thickness > 0; young, damping ratio, mass, drag, stiffness, damping, rest >= 0
-//   - a node's material exists; its central is -1 or the index of a node behind it; every node from
-//   the
-//     first one so named to the last is named, and its own central is -1
+// and rotates as a whole. Invariants, which `check_model` verifies:
+//   - there is a material and a node;
+//   - every number is finite; names contain no `"`, `#` or control character;
+//   - density, thickness > 0; young, damping ratio, mass, drag, stiffness, damping, rest >= 0;
+//   - a node's material exists;
+//   - a node's central is -1 or the index of a later node; the nodes named so are consecutive, and
+//     their own central is -1;
 //   - `normals`, `texcoords` are empty or complete: one normal per node (0 for central nodes), six
-//   coordinates per triangle
-//   - a spring has i < j, springs ascend strictly by (kind, i, j), no pair occurs under two kinds,
-//   and
-//     its ends are at different places; a spring of kind central joins a node to its own central
-//     node, the other kinds join no central node
-//   - triangles and tetrahedra have different nodes, none of them a central node; a tetrahedron has
-//   a positive volume, a material, which exists and has a Poisson's ratio, and with one of them all
-//   have middles
-//   - a skin has points, each with a tetrahedron that exists, and triangles of three different
-//   ones, each with a material that exists; its `texcoords` are empty or complete
+//     coordinates per triangle;
+//   - a spring has i < j, springs ascend strictly by (kind, i, j), no pair occurs under two kinds;
+//   - the ends of a spring have different positions;
+//   - a spring of kind central joins a node to its own central node, other kinds join none;
+//   - a triangle, or a tetrahedron, has different nodes, none of them a central node;
+//   - a tetrahedron has a positive volume, and an existing material with a Poisson's ratio;
+//   - all tetrahedra have middles, or none;
+//   - a skin has points, each with an existing tetrahedron;
+//   - its triangles have three different points, and an existing material;
+//   - its `texcoords` are empty or complete.
 
 #include "base/mesh.h"
 #include "base/vec3.h"
@@ -43,7 +43,7 @@ struct Material {
   double young = 1e4;            ///< Young's modulus, Pa
   double thickness = 1;          ///< of the wall that the surface stands for, mm
   double damping_ratio = 0.2;    ///< of a spring with its two masses; 1 is critical
-  std::optional<double> poisson; ///< Poisson's ratio, 0 to below 1/2; springs know none
+  std::optional<double> poisson; ///< Poisson's ratio, 0 to below 1/2; springs do not use it
 
   bool operator==(const Material&) const = default;
 };
@@ -86,8 +86,8 @@ struct Spring {
   bool operator==(const Spring&) const = default;
 };
 
-/// A surface that follows the elements of a model, in pictures and written shapes: nothing acts on
-/// it, and it acts on nothing. How a point follows is said in solid/skin.h.
+/// Embedded surface: it follows the elements of a model in pictures and written shapes, without
+/// forces in either direction. solid/skin.h describes how a point follows.
 struct Skin {
   std::vector<Vec3> points;                     ///< at rest, mm
   std::vector<std::uint32_t> tetrahedron;       ///< one per point: the element that it follows
@@ -129,7 +129,7 @@ std::size_t body_count(const Model& model);
 /// S. \pre the invariants hold
 std::size_t surface_count(const Model& model);
 
-/// Both, for who asks again and again.
+/// Both counts, to compute them once.
 struct NodeCounts {
   std::size_t surface = 0, body = 0;
 };
@@ -138,9 +138,9 @@ NodeCounts node_counts(const Model& model);
 /// Springs of one kind. \pre the invariants hold
 std::size_t spring_count(const Model& model, SpringKind kind);
 
-/// The part of each node: nodes joined by springs of kind edge or a tetrahedron share one, numbered
-/// from 0 by their smallest node; a central node has the part of the first node that it is named
-/// by.
+/// Connected component of each node, numbered from 0 by smallest node. Nodes joined by springs of
+/// kind edge or by a tetrahedron share one. A central node has the component of the first node that
+/// belongs to it.
 struct Components {
   std::vector<std::uint32_t> of_node;
   std::uint32_t count = 0;
@@ -177,8 +177,8 @@ std::string model_digest(const Model& model);
 /// coordinates where it has them, and face materials where it has several.
 TriangleMesh surface_mesh(const Model& model);
 
-/// What pictures and written shapes show of a model: its skin at rest, the points in their order,
-/// else surface_mesh().
+/// Mesh of a model for pictures and written shapes: its embedded surface at rest, with the points
+/// in their order, if it has one; else surface_mesh().
 TriangleMesh shown_mesh(const Model& model);
 
 } // namespace gewebe

@@ -40,7 +40,7 @@ std::vector<std::uint32_t> nodes_of(NodeRanges ranges) {
   return nodes;
 }
 
-/// What evaluation needs to know of a model, found out once and only where asked for.
+/// Evaluation of a selector. Data of the model is computed once, when it is first needed.
 class Evaluator {
 public:
   Evaluator(const Model& model, const NodeCounts& counts, const Selector& selector,
@@ -233,7 +233,8 @@ bool has_numbers_alone(const Selector& selector) {
   return selector.steps.size() == 1 && (first == Op::nodes || first == Op::file);
 }
 
-/// Without a look at the model: who drives a scene names a node in each line.
+/// Fast path for plain node numbers, without a pass over the model: a command for each node is
+/// common in interactive scenes.
 std::vector<std::uint32_t> numbered_nodes(const Model& model, const Selector& selector,
                                           const LoadNodeList& load) {
   const Selector::Step& only = selector.steps.front();

@@ -1,6 +1,5 @@
 #pragma once
-// The language that names nodes of a model: gewebe_selector(7). Used wherever a program asks which
-// nodes.
+// Selectors of nodes of a model, the language of gewebe_selector(7).
 
 #include "base/vec3.h"
 #include "model/model.h"
@@ -62,17 +61,18 @@ std::vector<std::string> node_list_names(const Selector& selector);
 /// Returns the text of the node list that a selector names as @NAME. It may throw Error.
 using LoadNodeList = std::function<std::string(const std::string& name)>;
 
-/// What a selector ranges over that names nothing else.
+/// Nodes over which a selector ranges by default.
 enum class SelectorScope : std::uint8_t {
-  surface, ///< what can be touched
-  body,    ///< nodes inside a solid too
+  surface, ///< nodes of the surface
+  body,    ///< also nodes inside a solid
 };
 
-/// The selected nodes, ascending; never empty. Evaluated on rest positions. A selector that names
-/// central nodes (by `central`, `all` or their numbers) ranges over all nodes, one that names nodes
-/// inside a solid (by `inside` or their numbers) over all but the central ones, any other one over
-/// the scope. \pre the invariants of model.h hold \throw Error if it selects nothing, or names a
-/// node or a component that the model does not have; of a node list file with place "NAME:LINE"
+/// The selected nodes, ascending; never empty. Positions are those at rest. A selector that names
+/// central nodes (by `central`, `all` or their numbers) ranges over all nodes. One that names nodes
+/// inside a solid (by `inside` or their numbers) ranges over all except central nodes. Any other
+/// one ranges over the scope. \pre the invariants of model.h hold
+/// \throw Error if it selects nothing, or names a node or a component that the model does not have;
+/// for a node list file with place "NAME:LINE"
 std::vector<std::uint32_t> select_nodes(const Model& model, const Selector& selector,
                                         const LoadNodeList& load = nullptr,
                                         SelectorScope scope = SelectorScope::surface);

@@ -1,5 +1,5 @@
 #pragma once
-// What parsing and evaluation of selectors share.
+// Shared by parsing and evaluation of selectors.
 
 #include <string>
 #include <string_view>

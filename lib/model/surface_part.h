@@ -1,5 +1,5 @@
 #pragma once
-// A part of a model's surface with its edges, for what happens at one place of a large one.
+// Part of a model's surface with its edges, for local changes of a large surface.
 
 #include "mesh/edges.h"
 #include "model/model.h"

@@ -1,5 +1,5 @@
 #pragma once
-// What of a mesh becomes a net of springs: faces and points that are used, numbered anew.
+// Clean-up of a mesh for a net of springs: used faces and points with new numbers.
 
 #include "base/context.h"
 #include "base/mesh.h"

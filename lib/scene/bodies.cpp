@@ -16,7 +16,7 @@ namespace gewebe::simulation {
 namespace {
 
 constexpr double worth_implicit = 20;       ///< explicit steps for one implicit one
-constexpr double implicit_step = 1.0 / 600; // s, where none is asked for: a tenth of a picture
+constexpr double implicit_step = 1.0 / 600; // s, default: a tenth of a frame
 
 } // namespace
 
@@ -202,8 +202,8 @@ bool moves_implicitly(const Object& object, Integration way) {
   return way == Integration::implicit || is_solid(object);
 }
 
-/// Of two that are attached: who is free to choose moves as the other does; of two, both implicitly
-/// if one would.
+/// Integration of two objects that are to be attached. An object with automatic integration takes
+/// that of the other one. If both are automatic, both are implicit if one alone would be.
 std::pair<Integration, Integration> chosen_together(const World& w, const Object& a,
                                                     const Object& b) {
   const bool is_free = a.integration == Integration::automatic,

@@ -1,5 +1,5 @@
 #pragma once
-// What can be done to a scene: objects and instruments by number, nodes by number.
+// Changes of a scene. Objects, instruments and nodes are given by number.
 
 #include "compliance/compliance_source.h"
 #include "contact/coupling.h"
@@ -26,31 +26,36 @@ constexpr const char* method_name(Method method) {
   return method == Method::ffe ? "ffe" : "ela";
 }
 
-/// How an elastodynamic net moves: by explicit steps (dynamics/elastodynamic.h), by those of solids
-/// (dynamics/solid_dynamic.h), or by these where explicit ones are far too short.
+/// Integration of an elastodynamic net: by explicit steps (dynamics/elastodynamic.h), by the
+/// implicit steps of solids (dynamics/solid_dynamic.h), or automatic: implicit if explicit steps
+/// would be far too short.
 enum class Integration { semi_implicit, implicit, automatic };
 
+/// Sets a force on each of the nodes.
 struct SetForce {
   std::size_t object = 0;
   std::vector<std::uint32_t> nodes;
-  Vec3 force;        ///< on each; 0 takes it away
-  double period = 0; ///< s; 0: it does not pulse
+  Vec3 force;        ///< on each node, 1e-6 N; 0 removes it
+  double period = 0; ///< of a pulse, s; 0: a constant force
 };
+/// Sets a pressure on the surface around each of the nodes.
 struct SetPressure {
   std::size_t object = 0;
   std::vector<std::uint32_t> nodes;
-  NodePressure pressure; ///< 0 takes it away
+  NodePressure pressure; ///< 0 removes it
 };
+/// Adds a mass to each of the nodes.
 struct SetMass {
   std::size_t object = 0;
   std::vector<std::uint32_t> nodes;
-  double mass = 0; ///< g, on each beside its own; 0 takes it away
+  double mass = 0; ///< g, of each node beside its own; 0 removes it
 };
+/// Prescribes a displacement of each of the nodes.
 struct SetDisplacement {
   std::size_t object = 0;
   std::vector<std::uint32_t> nodes;
   Vec3 displacement;
-  double duration = 0; ///< s that the way there takes an elastodynamic object's nodes
+  double duration = 0; ///< s, time in which the nodes of an elastodynamic object move there
 };
 /// Ties each of the first object's nodes to the nearest of the second's by a spring, at rest as
 /// they stand.
@@ -61,41 +66,43 @@ struct Attach {
   std::vector<std::uint32_t> others;
   double stiffness = 0; ///< g/s², of each spring
 };
-struct Release { ///< of force, pressure, displacement and grasp
+struct Release { ///< removes force, pressure, displacement and grasp of the nodes
   std::size_t object = 0;
   std::vector<std::uint32_t> nodes;
 };
-/// Puts an instrument there, in place of itself, or moves it from where it is.
+/// Puts an instrument at a pose. A present instrument is replaced.
 struct SetInstrument {
-  std::size_t instrument = 0; ///< instrument_count(): a new one, from when this is accepted
+  std::size_t instrument = 0; ///< instrument_count(): a new one, which exists once this is accepted
   InstrumentShape shape;      ///< radius > 0, friction >= 0
   Pose pose;                  ///< turn of length 1
-  std::string name{};         ///< of a new one, which no other has
+  std::string name{};         ///< of a new instrument; unique
 };
+/// Moves an instrument from its present pose to another one.
 struct MoveInstrument {
   std::size_t instrument = 0;
   Vec3 place;
-  std::optional<Quaternion> turn; ///< of length 1; none: as it is
-  double duration = 0;            ///< s that the way takes
+  std::optional<Quaternion> turn; ///< of length 1; empty: unchanged
+  double duration = 0;            ///< of the motion, s
 };
-/// Nodes follow an instrument as parts of it, from where they stand.
+/// Lets an instrument grasp nodes: they move with it rigidly from now on.
 struct Grasp {
   std::size_t object = 0;
   std::vector<std::uint32_t> nodes;
   std::size_t instrument = 0;
 };
-/// A hand leads the instrument through a spring and a damper from now on, or again at once.
+/// Sets a virtual coupling: a hand moves the instrument through a spring and a damper. Without a
+/// coupling the instrument follows its prescribed motion directly.
 struct SetCoupling {
   std::size_t instrument = 0;
   std::optional<Coupling> coupling;
 };
-/// Takes an instrument away; what it grasped is released.
+/// Removes an instrument and releases the nodes that it grasps.
 struct Withdraw {
   std::size_t instrument = 0;
 };
-/// Surfaces of two objects, or of one with itself, may touch from now on but not pass.
+/// Starts contact between the surfaces of two objects, or of one object with itself.
 struct SetContact {
-  std::size_t object = 0, other = 0; ///< the same: with itself
+  std::size_t object = 0, other = 0; ///< equal: self-contact
   double friction = 0;               ///< Coulomb's coefficient, >= 0
 };
 struct SetGravity {
@@ -104,62 +111,66 @@ struct SetGravity {
 struct SetTimestep {
   double dt = 0;
 };
-/// The two-step method for an elastostatic object from now on.
+/// Starts the two-step method for an elastostatic object.
 struct SetTwoStep {
   std::size_t object = 0;
   TwoStepOptions options;
-  std::function<std::shared_ptr<ComplianceSource>()> second; ///< asked once for an object
-  /// In place of `second`: the object as it came with other stiffnesses. It follows cuts.
+  std::function<std::shared_ptr<ComplianceSource>()> second; ///< called once for an object
+  /// Instead of `second`: the object's first model with other stiffnesses. It follows cuts.
   std::shared_ptr<const Model> model{};
 };
-/// Large rotations of an elastostatic solid from now on, see statics/warped_statics.h.
+/// Starts large rotations of an elastostatic solid, see statics/warped_statics.h.
 struct SetWarp {
   std::size_t object = 0;
 };
+/// Adds one item to the answers to steps: instruments, forces or surfaces, or shapes if none of
+/// these is set.
 struct Emit {
-  bool forces = false;      ///< else shapes
-  bool instruments = false; ///< rather
-  bool surfaces = false;    ///< rather
+  bool forces = false;
+  bool instruments = false;
+  bool surfaces = false;
 };
-/// Goes on by this method: an elastodynamic object starts at the present elastostatic shape, with
-/// no velocity; an elastostatic one takes its own shape at once.
+/// Changes the method of an object. An elastodynamic object starts at the present elastostatic
+/// shape with zero velocity. An elastostatic object takes its static shape at once.
 struct SetMethod {
   std::size_t object = 0;
   Method method = Method::ela;
 };
-/// Forgets what is kept to be quick (factors, columns, running sums): the next shape is computed
-/// from the load or the state of motion alone.
+/// Drops caches (factors, columns, running sums). The next shape is computed from the load or the
+/// state of motion only.
 struct Renew {
   std::size_t object = 0;
 };
-/// Makes what a first contact, or a first cut, of an elastostatic object needs, and what contacts
-/// at these nodes do.
+/// Computes in advance the data that the first contact, or the first cut, of an elastostatic object
+/// needs, and the data for contacts at the given nodes.
 struct Prepare {
   std::size_t object = 0;
   bool contact = true, cut = true;
   std::vector<std::uint32_t> nodes_ahead{};
 };
-/// What a cut severs: springs between sets of nodes, or what a plane passes, of all nodes or some.
+/// Severs the springs between two sets of nodes.
 struct SpringsToCut {
   std::vector<std::uint32_t> from, to;
 };
+/// Severs everything that a plane intersects, of all nodes or of the given ones.
 struct PlaneToCut {
   CutPlane plane;
   std::optional<std::vector<std::uint32_t>> nodes;
   bool along_faces = false; ///< of a solid: no tetrahedron is cut through
 };
+/// Cuts an object.
 struct CutObject {
   std::size_t object = 0;
   std::variant<SpringsToCut, PlaneToCut> what;
 };
-/// Springs that are stretched beyond this tear from now on; 0: none any more. A solid is parted
-/// where elements bear more than its limit, or without one where they are strained more than this.
+/// Starts tearing: springs tear that are strained more than `strain`; 0 ends it. A solid tears
+/// where elements bear more than `limit`, or, without a limit, where their strain exceeds `strain`.
 struct SetTear {
   std::size_t object = 0;
   double strain = 0;
   TearLimit limit{}; ///< of a solid
 };
-/// The model as it came; what has come off stays an object of its own.
+/// Restores an object's first model. Parts that have come off stay objects of their own.
 struct Restore {
   std::size_t object = 0;
 };
@@ -168,16 +179,16 @@ using Change =
                  MoveInstrument, SetCoupling, Grasp, Withdraw, SetContact, SetGravity, SetTimestep,
                  SetTwoStep, SetWarp, Emit, SetMethod, Renew, Prepare, CutObject, SetTear, Restore>;
 
-/// What a log says of an instrument alone; what does not apply stays empty.
+/// Columns of a log row that only instruments have. What does not apply stays empty.
 struct InstrumentRow {
-  std::optional<Vec3> end;        ///< the second one of its axis
-  std::optional<Quaternion> turn; ///< from how it came
+  std::optional<Vec3> end;        ///< second end of its axis
+  std::optional<Quaternion> turn; ///< rotation from its first orientation
   std::optional<Vec3> force, torque;
-  std::optional<std::uint64_t> nodes; ///< that it touches or grasps
-  std::optional<Vec3> hand;           ///< that leads it, of a coupled one
+  std::optional<std::uint64_t> nodes; ///< number of nodes that it touches or grasps
+  std::optional<Vec3> hand;           ///< position of the hand, of a coupled instrument
 };
 
-/// What a log says of a change; what does not apply stays empty.
+/// Row of a log, for a change. What does not apply stays empty.
 struct ChangeRow {
   std::string what, object;
   std::vector<std::uint32_t> nodes{};

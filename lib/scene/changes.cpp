@@ -9,7 +9,7 @@ namespace gewebe::simulation {
 
 namespace {
 
-/// What all kinds have in common, by what they name.
+/// Fills the columns of a log row that follow from the names of a change's fields.
 template <class Kind>
 void log_names(const World& w, const Kind& c, ChangeRow& row) {
   if constexpr (requires { c.object; })
@@ -250,7 +250,7 @@ void Rule<Emit>::log(const World&, const Emit& c, ChangeRow& row) {
 void Rule<Renew>::apply(World& w, const Renew& c) {
   Object& object = w.now.objects.at(c.object);
   object.statics->ahead = true;
-  renew(object); // as where a step is taken back: the last answer of large rotations stays
+  renew(object); // as in a rollback: the last result of large rotations stays
   touch(object);
 }
 

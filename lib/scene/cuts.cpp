@@ -24,9 +24,8 @@ namespace {
 
 constexpr double largest_turn = 0.1; ///< between two edges of a swept area, about its angle
 
-/// The stiffness of an elastostatic object, to follow its cuts; nothing: no solution was asked of
-/// it so far, or lately. It goes over to the next object, and is made anew where a cut is taken
-/// back.
+/// Stiffness of an elastostatic object that is updated after cuts; null if no solution was needed
+/// so far, or lately. The object after the cut takes it over. A rollback of a cut drops it.
 CutStiffness* stiffness_of(World& w, Object& object) {
   if (object.statics->stiffness || (!object.statics->made() && !has_moved(w, object)))
     return object.statics->stiffness.get();
@@ -114,7 +113,7 @@ CutState cut_again(const Object& old, std::vector<std::uint32_t> origin, const M
   return next;
 }
 
-/// Its shape is found from that before this cut, when somebody asks.
+/// Defers the shape: it will be computed from the shape before this cut when it is first read.
 void defer_shape(const Object& old, const Moves& moves, Object& next) {
   auto shape = std::make_shared<DeferredShape>(
       old.shown.deferred ? *old.shown.deferred
@@ -126,7 +125,7 @@ void defer_shape(const Object& old, const Moves& moves, Object& next) {
 
 } // namespace
 
-/// Whether it is known and can be cut; who says otherwise is warned once.
+/// Whether the object's model is known and can be cut. If it can't, a warning is issued once.
 bool may_cut(World& w, Object& object, Feature feature) {
   const bool feels_it = feels(w, object, feature);
   return object.matter->known && feels_it;
@@ -141,7 +140,7 @@ void carry_out(World& w, std::size_t index, CutModel cut) {
     w.options.warn("object " + old.name() + " at " + number_text(w.now.clock.time) +
                    " s: what comes off tears its skin along " + std::to_string(skin.torn) +
                    " edges that no cut has passed");
-  // Where parts start, and what instruments refer to. Without them it may never be asked for.
+  // Parts and instruments need the shape before the cut. Without them it may never be read.
   const bool deferred = ffe && !old.shown.shaped && free.parts.empty() &&
                         w.now.instruments.empty() && old.matter->known && !old.stages.options &&
                         !old.warp && !old.meets;
@@ -168,7 +167,7 @@ void carry_out(World& w, std::size_t index, CutModel cut) {
     try {
       prepared = cut_source(w, old, now, rest);
     } catch (const SingularStiffness&) {
-      prepared.reset(); // found when the shape is asked for
+      prepared.reset(); // the solver reports it when the shape is needed
       loose = true;
       if (velocity.empty()) // the factor may have followed the cut
         velocity = shape_velocity(w, old, true);
@@ -230,7 +229,7 @@ void announce_cut(World& w, std::size_t index) {
     throw;
   } catch (const std::bad_alloc&) {
     throw;
-  } catch (...) { // whatever a source throws: told where it is needed
+  } catch (...) { // a source may throw anything; it throws again where its result is needed
     object.statics->stiffness.reset();
   }
 }
@@ -343,8 +342,8 @@ void require_held(World& w, Object& object) {
 
 } // namespace
 
-/// A cut object that an elastostatic shape is asked of may have none: then it goes on
-/// elastodynamic.
+/// Makes an elastostatic object elastodynamic if cuts have left it free to move: it has no static
+/// shape then.
 void find_free_motion(World& w, std::size_t index) {
   Object& object = w.now.objects[index];
   const Statics& statics = *object.statics;

@@ -1,6 +1,7 @@
 #pragma once
-// Where objects' surfaces are, and how fast they move: gathered over their nodes once on the way to
-// a time, when somebody first asks; of a body at rest, once while it rests.
+// Cache of the bounding boxes and largest speeds of objects' surfaces. An entry is computed from
+// the nodes at its first use in an advance. The entry of a body at rest is kept while the body
+// rests.
 
 #include "base/vec3.h"
 
@@ -12,22 +13,24 @@ namespace gewebe::simulation {
 struct World;
 struct Object;
 
+/// Bounding box and largest speed of a surface.
 struct Extent {
-  Box3 box;         ///< of the nodes that have all of the surface
-  double speed = 0; ///< of the fastest of them, mm/s
+  Box3 box;         ///< of the nodes of the surface
+  double speed = 0; ///< of the fastest of these nodes, mm/s
 };
 
-/// As the object is now; at rest, if nothing has moved it. \pre its model is known
+/// Extent of the object's present positions, or of those at rest if it never moved.
+/// \pre its model is known
 Extent extent_of(const Object& object);
 
-/// Extents of a scene's objects during one way of it.
+/// Extents of a scene's objects during one advance.
 class Extents {
 public:
-  /// Keeps a reference to it.
+  /// Keeps a reference to the world.
   explicit Extents(World& world) : w_(world) {}
 
   const Extent& of(std::size_t index);
-  /// It has been moved.
+  /// To be called when an object has been moved.
   void forget(std::size_t object) { known_.erase(object); }
 
 private:

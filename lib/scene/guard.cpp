@@ -49,8 +49,8 @@ void take_back_again(World& w, Saved&& saved) noexcept {
   put_back(w, std::move(saved));
 }
 
-/// What is kept to be quick depends on the shapes that were asked of it, so it is renewed where one
-/// of them is taken back.
+/// Drops the caches of objects that have changed since the scene was saved. Caches depend on the
+/// shapes that were computed.
 void take_back(World& w, Saved&& saved) noexcept {
   put_back(w, std::move(saved));
   w.saved = false;

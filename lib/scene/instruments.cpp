@@ -111,9 +111,9 @@ InstrumentReport report_of(const World& w, std::size_t instrument) {
 
 namespace {
 
-/// Lets an instrument come to where it is from outside of what it would be in. It waits there since
-/// the last step, so that what moves or gives way in this one meets it, and takes no way from where
-/// it was.
+/// Moves an instrument to its pose from outside of the objects that it would be in. It has stood
+/// there since the last step, so that objects that move or deform in this step collide with it. Its
+/// previous pose does not matter.
 void enter_from_outside(World& w, Instrument& i) {
   const auto number = static_cast<std::size_t>(&i - w.now.instruments.data());
   const double now = w.now.clock.time;

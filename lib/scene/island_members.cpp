@@ -13,7 +13,7 @@ namespace {
 constexpr std::size_t most_parts = 256;
 constexpr std::size_t kept_islands = 16;
 
-/// Forces on vertices as forces on nodes, by what they come from.
+/// Forces on vertices as forces on nodes, sorted by node and cause.
 std::vector<NodalContactForce> nodal_forces(std::span<const contact::IslandMember::Force> forces,
                                             std::span<const std::uint32_t> node,
                                             std::span<const std::uint32_t> instrument_of_piece) {
@@ -248,8 +248,9 @@ std::vector<HeldNode> held_nodes(const World& w, const IslandParts& parts) {
   return all;
 }
 
-/// Tells a surface which of its vertices are held. \param offset  of the object's nodes in the
-/// surface's model \param first_instrument  piece of the island's first instrument
+/// Marks the vertices of a surface that instruments grasp.
+/// \param offset  of the object's nodes in the surface's model
+/// \param first_instrument  number of the surface of the island's first instrument
 void hold_vertices(std::span<const HeldNode> held, std::size_t object, std::size_t offset,
                    std::span<const std::size_t> instruments, std::size_t first_instrument,
                    contact::ModelSurface& model) {

@@ -20,7 +20,7 @@
 
 namespace gewebe::simulation {
 
-/// What an island consists of, ascending each.
+/// Members of an island. Each list ascends.
 struct IslandParts {
   std::vector<std::shared_ptr<Body>> bodies;
   std::vector<std::size_t> statics; ///< elastostatic objects
@@ -30,7 +30,7 @@ struct IslandParts {
   std::vector<std::size_t> objects() const;
 };
 
-/// A node that an instrument grasps, which does not touch what has it.
+/// A node that an instrument grasps. It has no contact with that instrument.
 struct HeldNode {
   std::size_t object = 0;
   std::uint32_t node = 0;
@@ -38,7 +38,7 @@ struct HeldNode {
   auto operator<=>(const HeldNode&) const = default;
 };
 
-/// Surfaces of an island, which serve as long as the same models and instruments take part.
+/// Cached surfaces of an island. They are valid while the models and instruments stay the same.
 struct IslandCache {
   struct Key {
     std::shared_ptr<const Model> model;
@@ -50,7 +50,7 @@ struct IslandCache {
     }
   };
   std::vector<Key> keys;
-  std::vector<double> friction; ///< of all pairs of pieces
+  std::vector<double> friction; ///< coefficients of all pairs of surfaces
   std::vector<HeldNode> held;   ///< by instruments
   std::deque<contact::ModelSurface> models;
   std::deque<contact::BodySurface> surfaces;
@@ -59,9 +59,10 @@ struct IslandCache {
   std::uint64_t used = 0;
 };
 
-/// The island of these parts, made where it is not known yet.
+/// Cached island of these parts. It is created at its first use.
 IslandCache& island_of(World& w, const IslandParts& parts);
 
+/// An elastodynamic body in an island.
 class BodyMember final : public contact::IslandMember {
 public:
   BodyMember(World& w, Body& body, const contact::ModelSurface& surface,
@@ -69,7 +70,7 @@ public:
       : w_(w), body_(body), surface_(surface), instrument_of_piece_(instrument_of_piece) {}
   contact::ContactBody& begin(double from, double to, const Context& context) override;
   void end(std::span<const Force> forces, double h, const Context& context) override;
-  /// Whether steps are of instruments that jump: nothing is left of their speed.
+  /// Whether instruments jump in these steps. The velocity that they cause is then removed.
   void set_clearing(bool clearing) { clearing_ = clearing; }
 
 private:
@@ -80,22 +81,24 @@ private:
   bool clearing_ = false;
 };
 
+/// An elastostatic object in an island.
 class StaticMember final : public contact::IslandMember {
 public:
   StaticMember(World& w, std::size_t object, const contact::ModelSurface& surface,
                const std::vector<std::uint32_t>& instrument_of_piece);
   contact::ContactBody& begin(double from, double to, const Context& context) override;
   void end(std::span<const Force> forces, double h, const Context& context) override;
-  /// In place of the load at the end of the step.
+  /// Replaces the load at the end of the step.
   void set_load(Load load) { given_ = std::move(load); }
-  /// Lets the load go from what is shown to that at the end of a way, unless it pulses: what jumps
-  /// between steps of the scene moves others no faster than the way takes.
+  /// Interpolates the load between `start` and `end`, from that of the output state to that at
+  /// `end`, unless it pulses. A jump of the load between steps of the scene then moves other
+  /// objects no faster than this interval allows.
   void follow_load(double start, double end);
 
 private:
   struct Way {
     Load from, to;
-    std::vector<double> stood; ///< displacement at the start
+    std::vector<double> stood; ///< displacement at `start`
     double start = 0, end = 0;
   };
   World& w_;
@@ -106,18 +109,20 @@ private:
   std::optional<Load> given_;
   std::optional<Way> way_;
   std::unique_ptr<StaticContactBody> body_;
-  std::unique_ptr<contact::HeldBody> held_; ///< in its place where the model holds all nodes
+  std::unique_ptr<contact::HeldBody> held_; ///< instead of body_ if the model holds all nodes
 };
 
+/// An instrument in an island.
 class InstrumentMember final : public contact::IslandMember {
 public:
-  /// \param start  where it stands
+  /// \param start  its present pose
   InstrumentMember(World& w, std::size_t instrument, const contact::BodySurface& surface,
                    const Pose& start)
       : w_(w), instrument_(instrument), surface_(surface), now_(start) {}
   contact::ContactBody& begin(double from, double to, const Context& context) override;
   void end(std::span<const Force> forces, double h, const Context& context) override;
-  /// Goes there in the next step, in place of its way. \param duration  of that, for a coupling
+  /// Sets the pose at the end of the next step, instead of that of the instrument's path.
+  /// \param duration  of the step, for a coupling
   void set_target(const Pose& target, double duration) {
     given_ = target;
     duration_ = duration;
@@ -144,30 +149,31 @@ struct IslandMembers {
   std::deque<InstrumentMember> instruments;
   std::vector<contact::IslandMember*> all;
 };
-/// \param start  where instruments stand, by number of the parts'
+/// \param start  poses of the instruments, in the order of parts.instruments
 void make_members(World& w, const IslandParts& parts, const IslandCache& island,
                   std::span<const Pose> start, IslandMembers& members);
 
 /// Largest displacement of an instrument's point in one step, over its radius.
 inline constexpr double instrument_step = 0.5;
 
-/// Between two loads; of prescribed displacements the way from where nodes stand.
+/// Interpolates between two loads. Prescribed displacements start at the present ones of their
+/// nodes. \param shape  displacement at the start \param part  0: `from`, 1: `to`
 Load load_between(const Load& from, const Load& to, std::span<const double> shape, double part);
-/// The shape that is shown, as far as displaced nodes need it: of all nodes if one of them is
-/// inside.
+/// Displacement of the output state: of all nodes if a displaced node is inside the solid, else of
+/// the surface.
 std::vector<double> stood_shape(World& w, Object& object);
 /// \throw Error that names the island's objects
 [[noreturn]] void fail_contact(const World& w, const IslandParts& parts, const Error& error);
 void count_contact(World& w, const contact::StepReport& report);
-/// What an instrument passes between two poses.
+/// Bounding box of an instrument between two poses.
 Box3 box_between(const InstrumentShape& shape, const Pose& from, const Pose& to);
-/// Parts of a way in which it moves by at most instrument_step.
+/// Number of steps between two poses such that each moves by at most instrument_step.
 std::size_t parts_of_way(const InstrumentShape& shape, const Pose& from, const Pose& to);
-/// Whether the object may be touched by instruments; told once where not.
+/// Whether instruments may touch the object. If not, a warning is issued once.
 bool takes_instruments(World& w, Object& object);
-/// A coupled instrument that touches nothing follows its hand.
+/// Lets a coupled instrument that touches nothing follow its hand.
 void follow_hand(Instrument& i, double duration, double to);
-/// Box of the surface of an object as it is shown.
+/// Bounding box of an object's surface in its output state.
 const Box3& shown_box(World& w, std::size_t index);
 
 } // namespace gewebe::simulation

@@ -482,7 +482,7 @@ void Rule<SetContact>::check(World& w, const SetContact& c) {
 
 namespace {
 
-/// Walls of cuts made before contact was asked for.
+/// Separates the walls of cuts that were made before the contact was set.
 void part_walls(World& w, const SetContact& c) {
   Motions motions;
   for (const std::size_t index : {c.object, c.other})

@@ -1,4 +1,4 @@
-// When an object's nodes get other numbers, all that names them follows.
+// Renumbering of nodes: updates everything that refers to nodes of an object after a cut.
 
 #include "base/disjoint_sets.h"
 #include "base/vector_at.h"
@@ -28,7 +28,7 @@ void Moves::add(std::span<const std::pair<std::uint32_t, To>> ways, std::size_t 
     all[next[node]++] = to;
 }
 
-/// An object that goes on in place of the old one, with another model and nothing of its nodes.
+/// The object that replaces `old`: it has another model, and no data by node.
 Object renumbered(const Object& old, std::shared_ptr<const Model> model) {
   const auto gravity_of = [](const Load& load) {
     Load alone;
@@ -391,7 +391,7 @@ void move_events(World& w, std::size_t index, const Moves& moves) {
 
 // ---- motion
 
-/// How the pieces of an object move, and everybody who shared its body.
+/// Motions of the pieces of an object, and of objects that shared its body.
 Motions motions_of(const World& w, std::size_t index, const Moves& moves,
                    const std::deque<Object>& pieces, std::span<const Vec3> velocity) {
   const Object& old = w.now.objects[index];
@@ -447,7 +447,7 @@ Motions motions_of(const World& w, std::size_t index, const Moves& moves,
 
 } // namespace
 
-/// Bodies anew for these objects and those tied to them, with the motions given.
+/// Creates new bodies for these objects and those attached to them, with the given motions.
 /// \pre objects that are in a body have a motion
 void renew_bodies(World& w, const Motions& motions) {
   DisjointSets sets(w.now.objects.size());

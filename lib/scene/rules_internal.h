@@ -1,7 +1,7 @@
 #pragma once
-// The table of changes: for each kind whether it can be accepted, whether it can take effect now,
-// what it does, and what a log says of it. A new kind is a struct in change.h, a row here, what it
-// does in the file of its duty, and a row of the grammar (formats/scene/scene.cpp).
+// Table of changes. Each kind of change has a row with its checks, its effect and its log entry. A
+// new kind needs a struct in change.h, a row here, an implementation in the file that the row
+// names, and a row of the grammar (formats/scene/scene.cpp).
 
 #include "scene/world_internal.h"
 
@@ -10,27 +10,29 @@
 
 namespace gewebe::simulation {
 
-/// What holds for a kind that says nothing else.
+/// Defaults for the row of a kind.
 template <class Kind>
 struct Plain {
-  /// That it can be accepted, now or for later. Nothing is changed by it but what is read.
-  /// \throw Error
+  /// Checks that the change can be accepted, now or for later. It may read models, but changes
+  /// nothing else. \throw Error
   static void check(World&, const Kind&) {}
-  /// What is known from when it is accepted, be it for later; twice where it was for later.
+  /// Registers what must exist as soon as the change is accepted. Called again when a change that
+  /// was scheduled for later takes effect.
   static void enter(World&, const Kind&) {}
-  /// That it can take effect now. \throw Error
+  /// Checks that the change can take effect now. \throw Error
   static void require(World&, const Kind&) {}
-  /// Behind the checks it may fail still, and is taken back then.
+  /// Whether `apply` may fail after the checks. It is then rolled back.
   static constexpr bool may_fail = false;
-  /// It is a moment that instruments' ways go through.
+  /// Whether the poses of instruments are recorded at the time of this change.
   static constexpr bool is_moment = true;
-  /// What it is about will come apart: so that the first cut costs no more than others.
+  /// Prepares cuts that this change makes likely, so that the first cut costs no more than others.
   static void announce(World&, const Kind&) {}
-  static constexpr bool announces_behind = true; // when it has taken effect too
-  /// Of a node that is doubled, both copies are meant.
+  static constexpr bool announces_behind = true; // also after the change has taken effect
+  /// Whether a node that has been doubled stands for both copies.
   static constexpr bool copies = true;
 };
 
+/// Row of a kind of change.
 template <class Kind>
 struct Rule;
 
@@ -40,7 +42,7 @@ struct Rule<SetForce> : Plain<SetForce> {
   static void check(World& w, const SetForce& c);
   static void apply(World& w, const SetForce& c);
   static void log(const World& w, const SetForce& c, ChangeRow& row);
-  static constexpr bool copies = false; // what the node had is shared
+  static constexpr bool copies = false; // the copies share the node's force
 };
 template <>
 struct Rule<SetPressure> : Plain<SetPressure> {
@@ -84,7 +86,7 @@ struct Rule<Emit> : Plain<Emit> {
 };
 template <>
 struct Rule<Renew> : Plain<Renew> {
-  static constexpr bool is_moment = false; // a record has it where nothing took effect
+  static constexpr bool is_moment = false; // a recording has it at times without another change
   static void apply(World& w, const Renew& c);
   static void log(const World&, const Renew&, ChangeRow& row) { row.what = "renew"; }
 };
@@ -200,15 +202,16 @@ struct Rule<Restore> : Plain<Restore> {
   static void log(const World&, const Restore&, ChangeRow& row) { row.what = "restore"; }
 };
 
-/// Shorter ones are lost in the rounding of the time, sooner or later. \throw Error
+/// Refuses periods that would sooner or later be lost in the rounding of the time. \throw Error
 void require_period(double period);
 
-/// One of the table's functions for a change of any kind.
-void accept(World& w, const Change& change); ///< checks, then enters
+/// Calls `check` and `enter` of the change's row.
+void accept(World& w, const Change& change);
+/// Calls `announce` of the change's row.
 void announce(World& w, const Change& change);
-/// Takes effect now. \throw Error where it is not accepted, or can't
+/// Applies a change now. \throw Error if it is not accepted, or can't take effect
 void apply(World& w, const Change& change);
-/// What a log says of a change that has just taken effect.
+/// Log row of a change that has just taken effect.
 ChangeRow row_of(const World& w, const Change& change);
 
 } // namespace gewebe::simulation

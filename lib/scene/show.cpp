@@ -277,8 +277,8 @@ void show(World& w, Object& object) {
     load_shown(w, object);
     update_in_time(w, object);
     shown.forces = static_forces(object);
-    shown.shaped = false; // until somebody asks for it
-    // Who never asks is warned too, if the contacts alone may leave the range.
+    shown.shaped = false; // computed when it is first read
+    // A shape that is never read causes a warning too, if its displaced nodes may leave the range.
     double max = 0;
     for (const auto& [node, d] : shown.load->displacement)
       max = std::max({max, std::abs(d.x), std::abs(d.y), std::abs(d.z)});

@@ -215,7 +215,7 @@ void Simulation::step_to(double time) {
   w.now.clock.lost = 0;
 }
 
-// ---- what is shown and told
+// ---- results
 
 std::span<const double> Simulation::displacement(std::size_t object) const {
   return whole_shape(*world_, world_->now.objects.at(object));

@@ -215,7 +215,8 @@ std::vector<Edge> trail_before(const Object& object, const BladeArea& area, Carr
   return {start};
 }
 
-/// Of a trail what may be wanted again, at rest. \pre the blade has left none
+/// Keeps the part of a trail that later cuts may need, at rest.
+/// \pre the object has no trail of this blade
 void leave_trail(Object& object, std::size_t instrument, const std::vector<Edge>& edges,
                  std::vector<Row> rows, Carried& carried) {
   BladeTrail trail{instrument, {}, edges.back(), std::move(rows)};
@@ -270,8 +271,8 @@ std::optional<CutModel> cut_by_plane(const World& w, std::size_t index, const Pl
   for (const double shift : std::span(sheet_shifts).first(sheet_shifts.size() - 1))
     try {
       return cut_shifted(shift);
-    } catch (const MeetingOfNoSheets&) { // its lines meet the skin's edges but for rounding:
-      continue;                          // others may not
+    } catch (const MeetingOfNoSheets&) { // its lines meet the embedded surface's edges up to
+      continue;                          // rounding; the next shift may avoid them
     }
   return cut_shifted(sheet_shifts.back());
 }

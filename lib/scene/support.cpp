@@ -1,4 +1,4 @@
-// Which methods go with which features, asked of an object.
+// Features that an object supports, from the table in support.h.
 
 #include "scene/support.h"
 

@@ -1,5 +1,6 @@
 #pragma once
-// Which methods go with which features: the one table that says so. What it does not list works.
+// Table of features that a kind of object does not support. Pairs that are not listed are
+// supported.
 
 #include <array>
 #include <cstdint>
@@ -7,20 +8,20 @@
 
 namespace gewebe {
 
-/// How an object goes on. It may be several of these: cut and elastostatic, attached and implicit.
+/// Trait of an object. It may have several: cut and elastostatic, attached and implicit.
 enum class Way : std::uint8_t {
   explicit_motion,
   implicit_motion,
   attached,
   elastostatic,
   two_step,
-  two_step_stored, ///< its second stage known by its stiffness alone
+  two_step_stored, ///< two_step whose second stage has a stored stiffness, but no model
   whole,
   cut,
-  solid,        ///< of tetrahedra, or with some
+  solid,        ///< with tetrahedra
   sprung,       ///< a solid with springs or central nodes beside its tetrahedra
-  net,          ///< of none
-  solid_motion, ///< a solid that moves
+  net,          ///< without tetrahedra
+  solid_motion, ///< an elastodynamic solid
   warped,       ///< with large rotations
   filled        ///< a net that keeps the volume it encloses
 };
@@ -30,7 +31,7 @@ inline constexpr std::array all_ways{
     Way::solid,           Way::sprung,          Way::net,      Way::solid_motion,
     Way::warped,          Way::filled};
 
-/// What may act on an object, or be done to it.
+/// Feature: an action on an object.
 enum class Feature : std::uint8_t {
   force,
   pressure,
@@ -42,11 +43,11 @@ enum class Feature : std::uint8_t {
   tear, ///< by strain, or stress
   restore,
   attach,
-  method, ///< another one
+  method, ///< change of the method
   two_step,
   renew,
   warp,         ///< large rotations
-  prepare,      ///< what contacts and cuts need
+  prepare,      ///< advance computation for contacts and cuts
   contact,      ///< with another object's surface
   self_contact, ///< of its surface with itself
 };
@@ -56,12 +57,12 @@ inline constexpr std::array all_features{
     Feature::method,  Feature::two_step,    Feature::renew,    Feature::warp,    Feature::prepare,
     Feature::contact, Feature::self_contact};
 
-/// A pair that does not go together.
+/// An unsupported pair of trait and feature.
 struct Gap {
   Way way{};
   Feature feature{};
-  bool refused = true;   ///< the command is; else the object is passed by, which is told once
-  std::string_view text; ///< behind "object NAME "; '*' stands for what it is attached to
+  bool refused = true;   ///< the command fails; else it skips the object, with one warning
+  std::string_view text; ///< after "object NAME "; '*' stands for the object that it is attached to
 };
 
 inline constexpr std::array gaps{
@@ -110,7 +111,7 @@ inline constexpr std::array gaps{
         "is attached to * and moves with it, expected one that is attached to none"},
 };
 
-/// What is in the way; null: it works.
+/// Entry of a pair; null: the pair is supported.
 constexpr const Gap* gap(Way way, Feature feature) {
   for (const Gap& one : gaps)
     if (one.way == way && one.feature == feature)

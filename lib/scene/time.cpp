@@ -18,7 +18,7 @@ namespace {
 constexpr double same_time = 1e-9; // of a step's length
 constexpr double max_events = 1e6; // repeated ones in a step
 
-/// A step with more events than anybody waits for is refused before it begins.
+/// Refuses a step with too many events before it begins.
 void require_few_events(const World& w, double to) {
   double count = 0;
   for (const auto& [time, event] : *w.now.events)

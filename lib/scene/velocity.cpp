@@ -11,7 +11,7 @@
 
 namespace gewebe::simulation {
 
-/// Before an object is shown anew: what it shows now is where it comes from.
+/// To be called before a new output state of an object: the present one becomes the previous state.
 void leave_shown(World& w, Object& object) {
   const double now = w.now.clock.time, before = w.now.clock.shown;
   Shown& shown = object.shown;
@@ -91,7 +91,7 @@ std::vector<Vec3> shape_velocity(World& w, Object& object, bool afresh) {
     const std::vector<double> before(shape.begin(), shape.end());
     between(before, shape_under(now));
   } catch (const SingularStiffness&) {
-    // It hangs loosely, and nobody has asked for a shape since.
+    // The object is free to move, and no shape has been computed since.
   }
   return velocity;
 }

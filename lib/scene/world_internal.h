@@ -1,5 +1,5 @@
 #pragma once
-// A Simulation from within: the scene, what runs it, and the functions that do, by file.
+// Internals of Simulation: its state, and the functions that work on it, grouped by source file.
 
 #include "base/error.h"
 #include "base/number_text.h"
@@ -22,26 +22,28 @@ namespace gewebe::simulation {
 
 using gewebe::number_text;
 
-/// Of what is told in single precision too, with room for sums.
+/// Bound for numbers that are written in single precision too, with room for sums.
 inline constexpr double largest_number = 1e38;
 
 struct IslandCache;
 
+/// A Simulation's state: the scene, and what a rollback does not restore.
 struct World {
   Context context;
   SimulationOptions options;
   Scene now{};
-  bool saved = false;                                  // under guard: a call that throws goes back
+  bool saved = false;                                  // under guard: an outer call rolls back
   std::vector<std::size_t> renewed{};                  // see Simulation::take_renewed
   std::vector<std::shared_ptr<IslandCache>> islands{}; // surfaces of islands, see islands.cpp
 };
 
-// guard.cpp: a call that fails leaves the scene as it was
+// guard.cpp: rollback of the scene after a call that fails
 struct Saved {
   Scene scene;
   std::vector<Body::Snapshot> bodies;
 };
 Saved save(World& w);
+/// Rolls back after a failure, and drops the caches that depend on the failed call.
 void take_back(World& w, Saved&& saved) noexcept;
 /// Rolls back so that the same step can be repeated. Caches stay valid, even within guarded().
 Saved saved_now(const World& w);
@@ -64,7 +66,7 @@ void guarded(World& w, Work&& work) {
   w.saved = false;
 }
 
-// objects.cpp: what they consist of
+// objects.cpp: models of objects
 void insert(World& w, Object object);
 void need_model(Object& object);
 
@@ -74,20 +76,20 @@ inline bool is_held_altogether(const Object& object) {
                              [](const Node& node) { return node.fixed == fixed_all; });
 }
 
-/// What is shown of it, or moves it, is no longer right.
+/// Marks the output state and the body of an object as out of date.
 inline void touch(Object& object) {
   object.shown.valid = false;
   if (object.body != nullptr)
     object.body->changed = true;
 }
 
-/// One that names its object and time.
+/// Error whose text names the object and the time.
 class ObjectError : public Error {
 public:
   using Error::Error;
 };
 
-/// Names object and time in an Error.
+/// Runs `work`; adds object and time to an Error that it throws.
 template <class Work>
 void at_object(const World& w, const Object& object, Work&& work) {
   try {
@@ -100,23 +102,23 @@ void at_object(const World& w, const Object& object, Work&& work) {
   }
 }
 
-// support.cpp: which methods go with which features
-/// What is in the way; null: it works.
+// support.cpp: features that an object's method supports
+/// Reason why an object does not support a feature; null: it does.
 const Gap* gap_of(const Object& object, Feature feature);
-/// \throw Error "object NAME …" where it does not
+/// \throw Error "object NAME …" if the object does not support the feature
 void require_support(const World& w, const Object& object, Feature feature);
-/// Whether it works; where not, the object is passed by, which is told once.
+/// Whether the object supports the feature. If not, a warning is issued once.
 bool feels(const World& w, Object& object, Feature feature);
 
-// statics.cpp: solvers of one step and of two
+// statics.cpp: solvers of elastostatic objects, of the one-step and the two-step method
 Elastostatic& solver_of(World& w, Object& object);
 WarpedStatics& warped_of(World& w, Object& object);
 ElastostaticCounts static_counts(const Object& object);
 void make_solver(const World& w, Object& object, std::shared_ptr<ComplianceSource> source);
 void update_solver(World& w, Object& object, const Load& load);
-/// Forgets what is kept to be quick.
+/// Drops the caches of an object: factors, columns, running sums.
 void renew(Object& object);
-/// Counts add up, errors are the larger ones.
+/// Adds counts; errors become the larger of both.
 void add_counts(ElastostaticCounts& sum, const ElastostaticCounts& more);
 void add_counts(SolidStepCounts& sum, const SolidStepCounts& more);
 TwoStep& two_step_of(World& w, Object& object);
@@ -124,107 +126,113 @@ void follow_cut(const World& w, const Object& old, std::span<const std::uint32_t
                 Object& next);
 void make_whole(const World& w, Object& object);
 void update_stages(World& w, Object& object, const Load& load);
-/// Whole, or of the nodes alone that the solver has rows for: all of the surface among them.
+/// Displacement of all nodes.
 std::span<const double> static_shape(Object& object);
+/// Displacement of the nodes that the solver has rows for: at least those of the surface.
 std::span<const double> static_surface(Object& object);
-/// As the surface, within the tolerance.
+/// As static_surface, within the tolerance.
 std::span<const double> static_rough_surface(Object& object);
-/// Measures the shape that no caller has asked for.
+/// Measures the error of a shape that no caller has read.
 void verify_shape(Object& object);
 std::vector<NodeVector> static_forces(const Object& object);
 
-// bodies.cpp: what is tied together, or near and may touch, and moves as one
+// bodies.cpp: bodies of one object, or of several that are attached to each other
 using Motions = std::map<std::size_t, std::vector<NodeMotion>>;
 void need_body(World& w, std::size_t object);
-/// All parts as one model, without what ties them. \param offset becomes the first node of each
+/// All parts as one model, without the springs that attach them.
+/// \param offset  becomes the first node of each part
 Model joined_model(const World& w, std::span<const std::size_t> parts,
                    std::vector<std::size_t>& offset);
 std::shared_ptr<Body> make_body(World& w, std::vector<std::size_t> parts,
                                 const Motions* motions = nullptr);
-/// With what hangs on its nodes.
+/// Model of an object, with the masses that SetMass has added.
 Model weighed_model(const Object& object);
-/// The body of an object goes on with other masses.
+/// Replaces the body of an object after a change of masses. Its motion stays.
 void make_body_again(World& w, std::size_t object);
-/// The same body by implicit steps.
+/// Replaces a body by one with implicit steps. Its motion stays.
 void make_implicit(World& w, std::shared_ptr<Body>& body);
 double integration_step(World& w, Body& body);
-/// What acts on all parts, to their body.
+/// Hands the loads of all parts to their body.
 void load_body(const World& w, Body& body);
-/// \throw what ended its motion, with the name of its object
+/// \throw the failure of the body, with the name of its object
 [[noreturn]] void raise(const World& w, const Body& body);
-/// Joint steps without contact.
+/// Advances bodies without contact to time `to`.
 void advance_freely(World& w, std::span<Body* const> bodies, double to);
 void drop_body(World& w, const Body* body);
-/// Solids that move as one have elements of one order and are moved alike. \throw Error
+/// Solids that share a body need elements of one order and one integration. \throw Error
 void require_like_solids(const World& w, std::span<const std::size_t> objects);
-/// Of tetrahedra, or with some. \pre its model is known
+/// Whether the model has tetrahedra. \pre its model is known
 inline bool is_solid(const Object& object) {
   return !object.model().tetrahedra.empty();
 }
-/// By steps that keep a factor.
+/// Whether its body takes implicit steps, which cache a factor.
 inline bool moves_implicitly(const Object& object) {
   return object.integration == Integration::implicit || is_solid(object);
 }
-/// How an object's nodes move. \pre it has a body
+/// Positions and velocities of an object's nodes. \pre it has a body
 std::span<const NodeMotion> motion_of(const Object& object);
 
-// islands.cpp: whose surfaces touch, and what moves together for it
-/// A way of all that moves, through contact.
+// islands.cpp: islands of objects and instruments in contact
+/// Advances all bodies to time `to`, with contact.
 void advance_bodies(World& w, double to);
-/// Before a step of the scene.
+/// To be called before a step of the scene.
 void begin_contact(World& w);
-/// Behind a step: contact forces on what moves, means over its time.
+/// To be called after a step: contact forces on elastodynamic objects become means over its time.
 void end_contact(World& w, double duration);
-/// What bodies did to contact forces so far goes to their objects.
+/// Renumbers the contact impulses of an object after a cut.
 void move_contacts(World& w, std::size_t index, const Moves& moves);
-/// Elastostatic objects that are in contact, or may come to be: shows those of them that need it.
-/// \return by object, whether it was shown here
+/// Computes the output state of elastostatic objects that are, or may come, in contact.
+/// \return by object, whether its output state was computed here
 std::vector<std::uint8_t> show_static_contacts(World& w);
-/// Objects that may come to move as one with this one, by ties and contact, itself among them.
+/// Objects that may share an island with this one, by ties and contact, itself included.
 std::vector<std::size_t> together(const World& w, std::size_t object);
-/// Where an instrument that appears comes from: out of all objects.
+/// Start pose of an instrument that appears at `pose`: outside of all objects.
 Pose entry_pose(World& w, const InstrumentShape& shape, const Pose& pose);
-/// \throw Error naming objects and the place where surfaces that may touch pass each other
+/// \throw Error naming objects and position if surfaces that may touch intersect each other
 void require_apart(World& w, const ContactRule& rule);
 
-// time.cpp: steps through events; show.cpp: the picture at their end
+// time.cpp: steps through events
 void advance(World& w, double to);
+
+// show.cpp: output state at the end of a step
+/// Computes the output state of an object.
 void show(World& w, Object& object);
-/// Of an elastostatic object that took part in steps of what moves.
+/// The same for an elastostatic object that shared an island with moving bodies in this step.
 void show_in_motion(World& w, Object& object);
 void begin_showing(World& w, Object& object);
 void end_showing(World& w, Object& object);
-/// What acts on it at a time, with the weight of what hangs on it. \pre its model is known
+/// Load of an object at a time, with the weight of added masses. \pre its model is known
 Load acting_at(const Object& object, double time);
-/// What acts on it now will be shown.
+/// Copies the present load to the output state.
 void load_shown(const World& w, Object& object);
+/// Warns, once per object, if a shape leaves the range of linear elasticity.
 void warn_of_range(World& w, Object& object);
-/// To be shown: within the tolerance.
+/// Computes the displacement for output, within the tolerance.
 void shape(World& w, Object& object);
-/// The same during a step, which may be taken back: the shape is then computed anew.
+/// The same during a step. A rollback of the step discards the result.
 void shape_to_show(World& w, Object& object);
-/// What the scene goes on by: exact.
+/// Computes the exact displacement, on which the scene depends.
 void shape_in_step(World& w, Object& object);
-/// Of all nodes, those inside a solid too.
+/// Displacement of all nodes, inner ones of a solid included.
 std::span<const double> whole_shape(World& w, Object& object);
 std::span<const double> whole_shape_in_step(World& w, Object& object);
-/// What its shape is of: the load, and what touches it.
+/// The load that belongs to a displacement, with contact forces.
 Load acting_load(const Shown& shown);
-/// That which is known: as it is shown, of all nodes if it was asked for. \pre shaped
+/// Displacement as known: of all nodes if that was computed, else of the first ones. \pre shaped
 std::span<const double> known_shape(const Object& object);
 double displacement_limit(Object& object);
 void require_bounded(Object& object, std::span<const double> displacement);
 
-// velocity.cpp: how fast elastostatic objects move
+// velocity.cpp: velocities of elastostatic objects
 void leave_shown(World& w, Object& object);
 bool has_moved(const World& w, const Object& object);
 std::vector<Vec3> shape_velocity(World& w, Object& object, bool afresh);
 
-// instruments.cpp: where they are and what they hold
+// instruments.cpp: poses and grasps of instruments
 std::size_t instrument_place(const World& w, const std::string& name) noexcept;
 std::size_t add_instrument(World& w, const std::string& name);
 InstrumentReport report_of(const World& w, std::size_t instrument);
-/// Those that stand in an object whose shape is another one come to where they are from outside.
+/// Moves instruments that are inside an object whose shape has jumped to their pose from outside.
 void let_instruments_enter(World& w);
 void drop_grips(World& w, std::size_t object, const std::vector<std::uint32_t>& nodes);
 void note_poses(World& w, std::optional<std::size_t> jumps = {});
@@ -233,14 +241,14 @@ std::optional<Pose> pose_at(const World& w, std::size_t moment, std::size_t inst
 
 void add_contact_forces(Object& object);
 
-// cuts.cpp: what they sever and what comes off
+// cuts.cpp: cuts, and parts that come off
 void announce_cut(World& w, std::size_t index);
 void find_deferred_shape(World& w, Object& object);
 void sweep_blades(World& w);
 void find_free_motion(World& w, std::size_t index);
 void carry_out(World& w, std::size_t index, CutModel cut);
 bool may_cut(World& w, Object& object, Feature feature);
-/// An Error of a cut, with the object's name.
+/// Runs `work`; adds the object's name to an Error that it throws.
 template <class Work>
 auto of_object(const std::string& name, Work&& work) {
   try {
@@ -253,33 +261,35 @@ auto of_object(const std::string& name, Work&& work) {
 }
 
 // solid_cuts.cpp: blades and planes through tetrahedra
-/// What a blade passed since the last step, nearly flat.
+/// Area swept by a blade since the last step, nearly flat.
 struct BladeArea {
   std::size_t instrument = 0;
   SweptQuad corners{};
 };
+/// \throw Error if the plane parts nothing
 CutModel plane_through(const World& w, std::size_t index, const PlaneToCut& plane);
-/// The same, or nothing where it parts nothing. \param skin_too else that stays as it is
+/// The same, or empty if the plane parts nothing.
+/// \param skin_too  cuts the embedded surface too
 std::optional<CutModel> cut_by_plane(const World& w, std::size_t index, const PlaneToCut& plane,
                                      bool skin_too = true);
 void sweep_solid(World& w, std::size_t index, std::span<const BladeArea> areas);
 
 // wound_walls.cpp: walls of cuts in contact
-/// \throw Error where surfaces that are to touch share a place at nodes that are held: no contact
-/// force can part them
+/// \throw Error if surfaces of the contact coincide at nodes that are held. No contact force can
+/// separate them
 void require_parted_holds(const World& w, const SetContact& c, const Motions& motions);
-/// Moves nodes of these objects' surfaces apart that stand at one place, so that contact can begin.
-/// \param motions  of bodies' objects; elastodynamic objects that are moved are among them then
-/// \return objects that were moved
+/// Separates coincident nodes of these objects' surfaces, so that contact can begin.
+/// \param motions  motions of bodies' objects; those of elastodynamic objects that are moved are
+/// added \return objects that were moved
 std::vector<std::size_t> separate_walls(World& w, std::span<const std::size_t> objects,
                                         Motions& motions);
 
-// tears.cpp: what gives way at the end of a step
+// tears.cpp: tearing of overstrained springs and elements at the end of a step
 void tear(World& w);
 
-// moves.cpp: all that names nodes follows them
+// moves.cpp: renumbering of nodes after a cut
 Object renumbered(const Object& old, std::shared_ptr<const Model> model);
-/// What all nodes had, at those of one of the objects: three numbers each.
+/// A vector field over the old nodes, renumbered to the nodes of one new object.
 std::vector<double> moved_field(const Moves& moves, std::size_t object,
                                 std::span<const double> field);
 void move_all(World& w, std::size_t index, const Moves& moves, std::deque<Object> pieces,

@@ -35,7 +35,7 @@ struct Elastostatic::State {
   std::uint64_t id = 0;  // of the compliance with these nodes held
   std::vector<std::uint32_t> id_of;
 
-  // The last load, its contact forces, and its shape, where that was asked for.
+  // The last load, its reactions, and its shape once it was read.
   Load load;
   std::vector<NodeVector> forces;
   std::vector<double> u;     // of the rows that sums have
@@ -376,7 +376,7 @@ struct Elastostatic::State {
       put(compliance.column_block(node, rows[k]), blocks[k]);
     if (now.displacement.empty())
       return;
-    // Held nodes give way to nothing: C - C_ch C_hh^-1 C_hc.
+    // Held nodes do not move: C - C_ch C_hh^-1 C_hc.
     const std::vector<std::size_t> axes = block.axes();
     std::vector<double> given(axes.size());
     for (std::size_t j = 0; j < 3; ++j) {

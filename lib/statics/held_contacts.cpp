@@ -90,7 +90,7 @@ std::vector<NodeVector> HeldContacts::meet(const Load& now, std::vector<double>&
   std::vector<double> coefficients, rest;
   std::vector<double> shape;
   const bool rigid = held_ && modes_.express(wanted, coefficients, rest);
-  if (!held_) { // nothing is left to give way
+  if (!held_) { // no axis is free
     spread(wanted, 1);
     shape = std::move(prescribed);
   } else if (rigid || modes_.open()) {

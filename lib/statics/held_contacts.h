@@ -1,5 +1,6 @@
 #pragma once
-// Displaced nodes by K with their axes held: K_ff u_f = f - K_fc d, f_c = K_cf u_f + K_cc d.
+// Solver for prescribed displacements that holds their axes in K: K_ff u_f = f - K_fc d, f_c = K_cf
+// u_f + K_cc d.
 
 #include "base/context.h"
 #include "compliance/axis_solver.h"
@@ -18,17 +19,19 @@
 
 namespace gewebe {
 
+/// Shapes and reactions under prescribed displacements. It caches the factor for the last nodes.
 class HeldContacts {
 public:
-  /// Keeps a reference to the model. \param free whether K is singular: displacements may not hold
-  /// the model then
+  /// Keeps a reference to the model.
+  /// \param free  whether K is singular; displacements may then fail to hold the model
   HeldContacts(const Model& model, const Context& context, bool free)
       : model_(model), context_(context), free_(free), axes_(3 * model.nodes.size()) {}
   HeldContacts(const HeldContacts&) = delete;
   HeldContacts& operator=(const HeldContacts&) = delete;
 
-  /// The shape under a load. \return what holds its displaced nodes, by ascending node
-  /// \throw Error as the factor; of a free model SingularStiffness, if it can move nevertheless
+  /// Computes the shape under a load. \return reactions of its displaced nodes, by ascending node
+  /// \throw Error as the factor
+  /// \throw SingularStiffness if a free model can move nevertheless
   std::vector<NodeVector> meet(const Load& now, std::vector<double>& u);
   /// Columns of the compliance with the nodes of the last load held. \pre a load was met
   const ColumnCache& columns(std::span<const std::uint32_t> nodes);
@@ -48,7 +51,7 @@ private:
   std::size_t axes_; ///< 3 n
   std::optional<StiffnessOperator> stiffness_;
   std::map<std::uint32_t, Vec3> nodes_;
-  std::optional<AxisSolver> held_; ///< none where nothing is free
+  std::optional<AxisSolver> held_; ///< empty if no axis is free
   std::optional<ColumnCache> columns_;
   ShapeModes modes_; ///< displacements to shape
   std::map<std::uint32_t, Vec3> base_force_;

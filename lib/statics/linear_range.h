@@ -1,5 +1,5 @@
 #pragma once
-// Whether a shape is where linear elasticity may be trusted.
+// Check whether a shape is in the range of linear elasticity.
 
 #include "model/model.h"
 
@@ -9,9 +9,10 @@
 
 namespace gewebe {
 
-/// How far a shape is from where linear elasticity holds: over all edge springs, of a model with
-/// tetrahedra over the edges of its triangles, the largest change of length over length, and the
-/// largest turn (displacement of one end against the other, across the edge, over its length).
+/// Largest strain and rotation of an edge, to be compared with the range of linear elasticity. The
+/// strain is the change of length over length. The rotation is the displacement of one end against
+/// the other, across the edge, over its length. Edges are all edge springs, or, of a model with
+/// tetrahedra, the edges of its triangles.
 struct LinearRange {
   double strain = 0, turn = 0;
   std::array<std::uint32_t, 2> strain_edge{}, turn_edge{}; ///< where
@@ -19,7 +20,7 @@ struct LinearRange {
 /// \pre displacements of all nodes, or of a solid's first surface_count(model)
 LinearRange linear_range(const Model& model, std::span<const double> displacement);
 
-/// Length of the shortest of these edges at rest, mm.
+/// Length of the shortest edge at rest, mm, of the same edges.
 double shortest_edge(const Model& model);
 
 } // namespace gewebe

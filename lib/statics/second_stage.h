@@ -1,5 +1,5 @@
 #pragma once
-// The model of the second stage of the two-step method: that of the first with other stiffnesses.
+// Model of the second stage of the two-step method: that of the first stage with other stiffnesses.
 
 #include "model/model.h"
 
@@ -8,11 +8,13 @@
 
 namespace gewebe {
 
-/// Whether nodes stand and are held alike, and springs and triangles join the same ones.
+/// Whether both models have the same positions and constraints of nodes, and their springs and
+/// triangles join the same nodes.
 bool same_but_stiffness(const Model& first, const Model& second);
 
-/// A cut model of the second stage, from that of the first: each spring is stiffer by as much as
-/// the springs that it comes from. \param origin by node of `cut`: the node before
+/// Cut model of the second stage, from that of the first stage. The stiffness of each spring is
+/// multiplied by the ratio of second to first stage of the springs that it comes from.
+/// \param origin  by node of `cut`: the node before
 /// \pre same_but_stiffness(first, second); `cut` was made from `first`
 Model cut_second_stage(const Model& cut, std::span<const std::uint32_t> origin, const Model& first,
                        const Model& second);

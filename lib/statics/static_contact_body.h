@@ -1,6 +1,6 @@
 #pragma once
-// Elastostatic objects in a step of contact (contact/step.h): x_free is the shape under the load
-// alone, W the compliance C between vertices.
+// Elastostatic objects as the contact solver sees them (contact/step.h): x_free is the shape under
+// the load without contact, W the compliance C between vertices.
 
 #include "contact/contact_body.h"
 #include "contact/island.h"
@@ -18,19 +18,20 @@
 
 namespace gewebe {
 
-/// Where an object is, and what acts on it.
+/// Displacement of an object, and forces on it.
 struct StaticContactState {
   const Model* model = nullptr;
   const std::vector<std::uint32_t>* vertices = nullptr; ///< nodes of the collision surface
   const Load* load = nullptr;                           ///< at the end of the step
   std::span<const double> displacement{};               ///< at its beginning, of the surface
-  std::vector<contact::VertexForce> forces{};           ///< contact forces then
-  /// Throws where a shape before contact is none: so far off that no contact could be found.
+  std::vector<contact::VertexForce> forces{};           ///< contact forces at its beginning
+  /// Throws if a shape before contact is so far off that no contact could be found.
   std::function<void(std::span<const double>)> require_shape{};
 };
 
-/// What the methods of statics have in common. Bodies that are not linear move by their quadratic
-/// models, so that they pass nothing, until these agree with the shape under the forces.
+/// Base of the contact bodies of all static methods. Nonlinear bodies move by their quadratic
+/// models, so that they pass through no other body, until the models agree with the shape under the
+/// forces.
 class StaticContactBody : public contact::ContactBody {
 public:
   explicit StaticContactBody(StaticContactState state);
@@ -47,8 +48,9 @@ public:
   double typical_force() const override { return typical_.force; }
   double vertex_stiffness() const override { return typical_.stiffness; }
 
-  /// Displacement of the surface's nodes, and all that acts.
+  /// Displacement of the surface's nodes.
   std::span<const double> displacement() const { return displacement_; }
+  /// Load with contact forces.
   const Load& acting() const { return acting_; }
 
 protected:
@@ -56,9 +58,9 @@ protected:
   const Model& model() const { return *state_.model; }
 
 private:
-  /// Shape under a load, of the surface's nodes at least.
+  /// Displacement under a load, of the surface's nodes at least.
   virtual std::span<const double> shape_under(const Load& load) = 0;
-  /// Error of that over the largest displacement.
+  /// Error of shape_under, over the largest displacement.
   virtual double shape_tolerance() const { return 0; }
   /// Blocks [row][force] of the compliance near the last shape. \param nodes  rows
   virtual void blocks_of(std::uint32_t node, std::span<const std::uint32_t> nodes,
@@ -72,13 +74,13 @@ private:
   // Of the quadratic model.
   std::vector<double> shape_; ///< under `forces_`
   std::vector<contact::VertexForce> forces_;
-  std::vector<std::uint32_t> rows_; ///< vertices that the compliance was asked for
+  std::vector<std::uint32_t> rows_; ///< vertices whose compliance was computed
 };
 
-/// The linear method.
+/// Body of the linear method.
 class ElastostaticContactBody final : public StaticContactBody {
 public:
-  /// \param solver  asked for when needed
+  /// \param solver  called when the solver is needed
   ElastostaticContactBody(StaticContactState state, std::function<Elastostatic&()> solver)
       : StaticContactBody(std::move(state)), solver_(std::move(solver)) {}
   bool is_linear() const override { return true; }
@@ -91,7 +93,7 @@ private:
   std::function<Elastostatic&()> solver_;
 };
 
-/// The two-step method: linear for a given share of both stages.
+/// Body of the two-step method: linear for a given share of both stages.
 class TwoStepContactBody final : public StaticContactBody {
 public:
   using Stages = std::function<std::pair<Elastostatic&, TwoStep&>()>;
@@ -106,7 +108,7 @@ private:
   Stages stages_;
 };
 
-/// Large rotations.
+/// Body with large rotations.
 class WarpedContactBody final : public StaticContactBody {
 public:
   WarpedContactBody(StaticContactState state, std::function<WarpedStatics&()> solver)

@@ -39,7 +39,7 @@ double outer_force(const Model& model, const Load& load, std::uint32_t node, int
          model.nodes[node].mass * load.gravity[axis];
 }
 
-/// Over the free axes, but those of displaced nodes only if asked for.
+/// Norm of the load over the free axes; with those of displaced nodes if `displaced_too`.
 double norm_of(const Model& model, const Load& load, bool displaced_too) {
   double sum = 0;
   const auto add = [&](std::uint32_t node) {
@@ -214,7 +214,7 @@ struct TwoStep::State {
     std::vector<double> u;
     bool known = true;
   };
-  Shape whole, surface, rough; // the surface's where it was asked for alone
+  Shape whole, surface, rough; // each is computed when it is read
 
   std::vector<std::uint32_t> nodes; // of contact
   std::vector<std::size_t> axes;    // of them, those that are free: 3 k + a for nodes[k]
@@ -396,7 +396,7 @@ void TwoStep::second_compliance_blocks(const Load& load, std::uint32_t node,
 
 namespace {
 
-/// The same for both, so that neither depends on which was asked for before.
+/// Shared by all displacements, so that none of them depends on which was read before.
 template <class State, class Shape>
 std::span<const double> shape_of(State& state, Elastostatic& first, typename State::Displacement of,
                                  Shape& shape) {

@@ -1,17 +1,17 @@
 #pragma once
-// The two-step method (report 3.3.3, eq. 3.4): soft up to a threshold of the load, stiffer beyond.
+// Two-step method (report 3.3.3, eq. 3.4): soft up to a threshold of the load, stiffer beyond.
 //
-// f is the object's stacked load over its free axes: forces, weight, and what holds displaced
-// nodes; C1 and C2 are the compliances of the two stages. With s = min(1, f0/|f|)
+// f is the object's stacked load over its free axes: forces, weight, and reactions of displaced
+// nodes. C1 and C2 are the compliances of the two stages. With s = min(1, f0/|f|)
 //
 //   u = C1 f - (1 - s) C2 f       eq. 3.4, its sgn read as a step
 //   u = s C1 f + (1 - s) C2 f     in series
 //
 // since f - f0 f/|f| = (1 - s) f. Both are continuous at |f| = f0. Beyond it, along one direction
-// of f, the first goes on with the slope C1 - C2, the second with C2.
+// of f, the first has the slope C1 - C2, the second C2.
 //
-// Where displacements d are given, f is what they take: on the contact axes, with A1, A2 the blocks
-// of C1, C2 and v1, v2 the displacements there under all other loads,
+// If displacements d are prescribed, f includes their unknown reactions f_c. On the prescribed
+// axes, with A1, A2 the blocks of C1, C2 and v1, v2 the displacements there under all other loads,
 //
 //   (A1 - (1-s) B) f_c = d - v1 + (1-s) w,   B = A2, w = v2;  in series B = A1 - A2, w = v1 - v2
 //
@@ -32,15 +32,16 @@ namespace gewebe {
 
 struct TwoStepOptions {
   double threshold = 0; ///< f0 > 0, 1e-6 N
-  bool series = false;
+  bool series = false;  ///< the second of the formulas above
 
   bool operator==(const TwoStepOptions&) const = default;
 };
 
-/// |f| of what is given: forces and weight over the free axes, contact forces not among them.
+/// |f| of the given forces and weight over the free axes, without the reactions of displaced nodes.
 double load_norm(const Model& model, const Load& load);
 
-/// The contact axes of two stages as one problem in s, prepared for many displacements.
+/// Solver for the reactions of prescribed displacements in the two-step method: one problem in s,
+/// prepared for many displacements.
 class TwoStepContact {
 public:
   /// Blocks of `size` times `size` numbers, symmetric. \throw Error if A1 is not positive definite,
@@ -54,17 +55,17 @@ public:
   struct Problem {
     std::span<const double> wanted;       ///< d
     std::span<const double> first, other; ///< v1, v2
-    std::span<const double> carried;      ///< what else acts on the contact axes
+    std::span<const double> carried;      ///< other forces on the prescribed axes
     double outside = 0;                   ///< |f| of all other axes
     double threshold = 0;                 ///< f0 > 0
   };
   struct Answer {
-    double s = 1;              ///< 1 where the load is not beyond the threshold
-    std::vector<double> force; ///< on the contact axes, `carried` not among it
+    double s = 1;              ///< 1 if the load is not beyond the threshold
+    std::vector<double> force; ///< on the prescribed axes, without `carried`
   };
-  /// Of several points of the curve that have this displacement, the one nearest to the threshold
-  /// (of 16 evenly spaced parts of s, the first in which the curve crosses). s is exact to
-  /// rounding. \pre spans of size() numbers
+  /// Solves for s and the forces. If several points of the curve have this displacement, the result
+  /// is the one nearest to the threshold (of 16 evenly spaced parts of s, the first in which the
+  /// curve crosses). s is exact to rounding. \pre spans of size() numbers
   Answer solve(const Problem& problem) const;
   std::size_t size() const noexcept;
 
@@ -73,13 +74,15 @@ private:
   std::unique_ptr<State> state_;
 };
 
-/// One object under the two-step method. Its first stage is an Elastostatic of the caller's.
+/// Solver of one object with the two-step method. The caller owns the Elastostatic of its first
+/// stage.
 class TwoStep {
 public:
-  /// Keeps a reference to the model, that of the first stage: positions, constraints and masses
-  /// are shared. \param tolerance of the second stage, see ElastostaticOptions; each stage keeps
-  /// its own   \param second of C2
-  /// \throw Error if there is none or the threshold is not positive
+  /// Keeps a reference to the model, that of the first stage. Both stages share positions,
+  /// constraints and masses.
+  /// \param second  source of C2
+  /// \param tolerance  of the second stage, see ElastostaticOptions; each stage has its own
+  /// \throw Error if `second` is null or the threshold is not positive
   TwoStep(const Model& model, std::shared_ptr<ComplianceSource> second, const Context& context,
           const TwoStepOptions& options, double tolerance = 0);
   ~TwoStep();
@@ -87,18 +90,19 @@ public:
 
   void set(const TwoStepOptions& options);
 
-  /// The forces under `load`. Up to the threshold they are those of `first` alone, the second stage
-  /// is not touched. \pre as Elastostatic::update
-  /// \throw Error as it, and if no force can be found for the displacements: TwoStepContact
+  /// Computes the forces under `load`. Up to the threshold they are those of `first`, and the
+  /// second stage is not used. \pre as Elastostatic::update
+  /// \throw Error as Elastostatic::update, and if no force is found for the displacements, see
+  /// TwoStepContact
   void update(Elastostatic& first, const Load& load);
 
-  /// As those of Elastostatic; the shape is computed by the first call behind an update.
-  /// \param first that of the update; between them it may have been asked for other loads
+  /// As Elastostatic::displacement; computed by the first call after an update.
+  /// \param first  that of the update; it may have been updated for other loads since
   std::span<const double> displacement(Elastostatic& first);
-  /// As Elastostatic's, of the rows that both stages have.
+  /// As those of Elastostatic, of the rows that both stages have.
   std::span<const double> surface_displacement(Elastostatic& first);
   std::span<const double> rough_surface(Elastostatic& first);
-  /// Of the first stage, as Elastostatic.
+  /// As Elastostatic::verify, of the first stage.
   void verify(Elastostatic& first);
   const std::vector<NodeVector>& contact_forces() const noexcept;
 

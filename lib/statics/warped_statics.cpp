@@ -60,7 +60,7 @@ struct WarpedStatics::State {
   Load whole_of; // what that is of
   std::shared_ptr<const WarpedAnswer> answer;
   WarpedCounts counts;
-  // Of the answer, where they were asked for.
+  // Displacements of the answer, once they were read.
   std::vector<double> surface, all, local;
 
   State(const Model& m, std::shared_ptr<ComplianceSource> source, const Context& context)

@@ -1,5 +1,5 @@
 #pragma once
-// Coarser cells inside: the cells of a block as the leaves of an octree. For the room alone.
+// Coarser cells inside: the cells of a block as the leaves of an octree.
 
 #include "base/context.h"
 #include "stuffing/bcc_internal.h"
@@ -32,10 +32,10 @@ struct BlockLevels {
 
 /// The leaves of all blocks and the lattice points that are nodes of them.
 ///
-/// Labelle and Shewchuk 2007, section 3: a leaf is a cube, of neighbours across a face or an edge
-/// one is at most twice as large as the other. All points of the lattice with an edge to the other
-/// side or another material have but leaves of one cell round them, so that what is warped or cut
-/// is as on a lattice that isn't graded.
+/// Labelle and Shewchuk 2007, section 3: a leaf is a cube. Of two neighbours across a face or an
+/// edge, one is at most twice as large as the other. Lattice points with an edge to the other side
+/// or to another material have only leaves of one cell around them. Warps and cuts are therefore
+/// the same as on a lattice without grading.
 struct Grading {
   unsigned levels = 0;             ///< of the largest leaf; 0: no grading here
   std::vector<BlockLevels> blocks; ///< empty where levels == 0

@@ -1,5 +1,5 @@
 #pragma once
-// From a volume to tetrahedra: isosurface stuffing.
+// Tetrahedra from a volume by isosurface stuffing.
 
 #include "base/context.h"
 #include "tetrahedra/tet_mesh.h"
@@ -69,9 +69,10 @@ struct StuffingReport {
 /// What is smaller than a cell can be lost.
 ///
 /// Every dihedral angle lies between stuffing_angle_min and stuffing_angle_max, every tetrahedron
-/// has a positive volume, the boundary is a closed 2-manifold (or several). To keep it one, a warp
-/// after which the tetrahedra at a point would not make a ball or half a ball is undone, and
-/// cut points near that point are moved away from it along their edges, to alpha at most.
+/// has a positive volume, and the boundary consists of closed 2-manifolds. A warp that would
+/// violate this is undone: one after which the tetrahedra at a point form neither a ball nor half a
+/// ball. Cut points near that point are then moved away from it along their edges, to alpha at
+/// most.
 ///
 /// With `grade` the inside is an octree whose leaves double inwards, of neighbours across a face or
 /// an edge by one step at most (section 3 of the paper). Between them stand halves of tetrahedra,

@@ -1,5 +1,5 @@
 #pragma once
-// Merges the points of each cluster as far as the mesh stays a mesh; for surface/snapping.cpp.
+// Merges the points of each cluster as far as the mesh stays valid; for surface/snapping.cpp.
 
 #include "surface/snap_lattice_internal.h"
 #include "surface/snapping.h"
@@ -10,10 +10,9 @@
 
 namespace gewebe {
 
-/// Steps of `snap` leave their marks in the lattice's SnapBlocks: `merged` where a point was merged
-/// into another, `looked_at` where it is what others were merged into, `crowded` where another
-/// point of the same corner is left or, at Place::corner, where the surface isn't a single sheet
-/// there.
+/// Result of the merges. Steps of `snap` mark points in the lattice's SnapBlocks. `merged`: the
+/// point was merged into another. `looked_at`: others were merged into it. `crowded`: another point
+/// of the same corner is left, or, with Place::corner, the surface isn't a single sheet there.
 struct SnapMerges {
   struct Place {
     std::uint32_t point = 0;

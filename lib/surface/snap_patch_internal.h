@@ -1,5 +1,5 @@
 #pragma once
-// Clusters of points on the edges at one corner, merged by bits alone; for
+// Merges clusters of points on the edges at one corner by bit operations; for
 // surface/snap_collapse.cpp.
 //
 // Every cell with one of those edges has that corner, so all neighbours of the points lie on the
@@ -23,12 +23,12 @@ struct PatchEdges {
   std::uint32_t z = 0;
 };
 
-/// What became of a cluster. Its members are numbered by direction: 2 axis for the point on the
+/// Result for a cluster. Its members are numbered by direction: 2 axis for the point on the
 /// edge that leads up from the corner, 2 axis + 1 for that on the edge from below.
 struct PatchMerges {
   struct Group {
     std::size_t count = 0;
-    std::array<std::uint8_t, 6> members{}; ///< the target, then what was merged there in turn
+    std::array<std::uint8_t, 6> members{}; ///< the target, then the points merged into it, in order
   };
   std::size_t count = 0;
   std::array<Group, 3> groups{};
@@ -37,18 +37,19 @@ struct PatchMerges {
                                           ///< n >> 2) of the corner; 1 is the far side
 };
 
-/// The clusters of one block after the other.
+/// Merges the clusters of one block after the other.
 class SnapPatches {
 public:
   explicit SnapPatches(const SnapLattice& lattice) : lattice_(lattice) {}
   /// Goes to block n, for corners in the slices whose bits are set.
   void enter(std::size_t n, unsigned slices);
   /// Merges the cluster at a corner of the block if it satisfies the conditions of
-  /// merge_snap_clusters; else answers false. \pre it draws no fin
+  /// merge_snap_clusters; else returns false. \pre it draws no fin
   bool take(unsigned slice, unsigned bit, PatchMerges& result);
-  /// Is the surface in the cells round the corner a single sheet? It is if lines along one axis
-  /// lead through it once at most, all in the same sense and one at the corner, and if the corner
-  /// has no two opposite neighbours on the other side. \pre enter(n, slices) with this slice
+  /// Whether the surface in the cells round the corner is a single sheet. It is if two conditions
+  /// hold. Lines along one axis intersect it once at most, all in the same sense, and one at the
+  /// corner. The corner has no two opposite neighbours on the other side.
+  /// \pre enter(n, slices) with this slice
   bool is_single_sheet(unsigned slice, unsigned bit) const;
 
   static constexpr std::size_t padded = 10;

@@ -100,8 +100,8 @@ private:
   struct SmallFace {
     std::uint32_t block = 0, face = 0, triangle = 0;
   };
-  /// Of the places of a block's edges: the point's new number, bit 32 where a face of it may have
-  /// no area, and bit 33 where it is crowded.
+  /// By edge of a block: the point's new number. Bit 32 is set if a face of it may have no area,
+  /// bit 33 if it is crowded.
   using PlaceNumbers = std::array<std::uint64_t, edge_places>;
 
   void count(TriangleMesh& mesh);

@@ -1,6 +1,6 @@
 #pragma once
-// Fewer and better triangles: points of the isosurface that lie near a corner of the lattice are
-// merged there, without ever breaking the mesh (report FZKA 7190, section 3.1.4).
+// Snapping: points of an isosurface near a corner of the lattice are merged there, for fewer and
+// better triangles. The mesh stays valid (report FZKA 7190, section 3.1.4).
 
 #include "base/context.h"
 #include "base/mesh.h"
@@ -38,9 +38,8 @@ struct SnapResult {
 
 /// Snaps the points of an isosurface to the corners of its lattice.
 ///
-/// 1. A crossing at distance <= epsilon from a corner joins that corner's cluster (at 0.5 from
-/// both:
-///    the lower one). Epsilon 0 joins the crossings that lie exactly on a corner.
+/// 1. A crossing at distance <= epsilon from a corner joins that corner's cluster; at 0.5 from both
+///    corners it joins the lower one. Epsilon 0 joins the crossings that lie exactly on a corner.
 /// 2. Fin rule: a point outside all clusters whose neighbours lie in at most two clusters would be
 ///    left with two opposite faces or none; it joins the nearer of the two.
 /// 3. Each cluster, in the order of its first point, is collapsed edge by edge where the link
@@ -48,22 +47,25 @@ struct SnapResult {
 ///    component is no tetrahedron. So the mesh stays closed, 2-manifold and oriented, with the same
 ///    Euler number and components, without equal faces or faces with equal corners.
 ///
-/// What the link condition refuses stays as it is, for example the last tetrahedron of a component
-/// that lies in one cluster. Place::mean moves only merged points, Place::corner every point of a
-/// cluster (but no point of a fin on its own). With Place::corner faces between corners in one line
-/// have no area: their longest edge is flipped (flip_flat_faces), and the points of faces that no
-/// flip helps, for they coincide, go where Place::mean has them. What is still flat is counted.
-/// Where faces of the result would cut each other, as across a wall thinner than a voxel, the
-/// corners to which their points went draw only points that lie on them, and all is done again
-/// while that leaves fewer of such faces. Only faces are compared that have a point of a corner
-/// that keeps several points (with Place::corner: where the surface isn't a single sheet), that are
-/// turned out of their cell's direction, or that lie beside one of these; no other was seen to cut.
+/// Edges that the link condition refuses stay, for example the last tetrahedron of a component that
+/// lies in one cluster. Place::mean moves only merged points, Place::corner every point of a
+/// cluster (but no point of a fin on its own).
+///
+/// With Place::corner, faces between corners in one line have no area. Their longest edge is
+/// flipped (flip_flat_faces). If no flip helps, because points coincide, these points get the
+/// positions of Place::mean. Faces that are still flat are counted.
+///
+/// Faces of the result may cut each other, as across a wall thinner than a voxel. Their corners
+/// then draw only points that lie on them, and everything is done again while the number of such
+/// faces decreases. Three kinds of faces are compared: those with a point of a corner that keeps
+/// several points (with Place::corner: where the surface isn't a single sheet), those turned out of
+/// their cell's direction, and those beside one of these. No other face was seen to cut.
 ///
 /// Points and triangles keep the order of their first member; unused points vanish. Linear time.
 ///
-/// What is snapped is surface.lattice as marching_cubes or marching_cubes_to_snap made it; the mesh
-/// of the surface isn't looked at. Most clusters are taken in parallel; any number of threads gives
-/// the same bytes.
+/// The input is surface.lattice, from marching_cubes or marching_cubes_to_snap; the mesh of the
+/// surface is not used. Most clusters are merged in parallel; the result is the same bytes for any
+/// number of threads.
 ///
 /// \throw Error if epsilon is not within 0 … 0.5, or if context.max_memory would not do
 SnapResult snap(const Context& context, const IsoSurface& surface, const SnapOptions& options);

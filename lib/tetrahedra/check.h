@@ -1,6 +1,5 @@
 #pragma once
-// What can be said about a tetrahedral mesh made elsewhere, what of it can't be used, and what of
-// that can be mended.
+// Examination and repair of tetrahedral meshes from other programs.
 
 #include "tetrahedra/tet_mesh.h"
 
@@ -8,7 +7,7 @@
 
 namespace gewebe {
 
-/// How many there are of a kind, and the first of them.
+/// Number of faulty elements of a kind, and the first of them.
 struct TetFinding {
   std::uint64_t count = 0;
   std::uint32_t first = 0;

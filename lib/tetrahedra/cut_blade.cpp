@@ -33,9 +33,9 @@ int side_after_step(const Vec3& a, const Vec3& b, const Vec3& c, const Vec3& p) 
   return sign;
 }
 
-/// Sign of (q - p) . ((a - p) x (b - p)) after the step of p and q, where it is 0 before: that of
-/// the step times (q - p) x (b - a). Right wherever the line through p and q meets the edge from a
-/// to b, to which it is not parallel; elsewhere the same for whoever asks.
+/// Sign of (q - p) . ((a - p) x (b - p)) after the step of p and q, if it is 0 before: that of the
+/// step times (q - p) x (b - a). It is right if the line through p and q meets the edge from a to
+/// b, and is not parallel to it. Else it is at least the same for all callers.
 int turn_after_step(const Vec3& p, const Vec3& q, const Vec3& a, const Vec3& b) {
   for (int axis = 0; axis < 3; ++axis) {
     // Their difference is meant: of equal signs it is not known, but the edge isn't met then.

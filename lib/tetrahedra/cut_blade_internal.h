@@ -1,5 +1,5 @@
 #pragma once
-// The surface that a blade has swept: which edges pass through it.
+// Surface swept by a blade, and its intersections with edges.
 
 #include "base/mesh.h"
 #include "base/vec3.h"
@@ -13,26 +13,29 @@
 
 namespace gewebe {
 
-/// How an edge passes through it.
+/// Intersection of an edge with the surface.
 struct BladeCrossing {
   std::size_t passes = 0;
   int direction = 0; ///< upward minus downward passes; 0: both ends are on one side
-  double share = 0;  ///< of the way at the middle one of the passes, 0 … 1
+  double share = 0;  ///< position of the middle pass along the edge, 0 … 1
 };
+
+/// The swept surface, with a hierarchy of its triangles.
 
 class Blade {
 public:
   /// \throw Error as cut_tetrahedra, of the blade
   explicit Blade(const TriangleMesh& surface);
 
-  /// Of all of it; empty without triangles.
+  /// Bounding box; empty without triangles.
   const Box3& box() const { return tree_.box(); }
 
-  /// May the surface come into the box? (By boxes of its triangles.)
+  /// Whether the box of a triangle of the surface meets the given box.
   bool meets(const Box3& box) const;
 
-  /// On the way between two points. Which end of an edge comes first must depend on the edge alone,
-  /// so that all who ask hear the same. \pre coordinates that the predicates take
+  /// Intersection of the edge between two points. The order of the ends must depend on the edge
+  /// alone, so that all callers get the same result. \pre coordinates as base/exact_predicates.h
+  /// requires
   BladeCrossing crossing(const Vec3& from, const Vec3& to) const;
 
 private:

@@ -60,7 +60,7 @@ private:
   }
   bool is_passed_once(std::uint32_t vertex) const { return degree_[vertex] == 2; }
 
-  /// Loops, but for vertices where they meet.
+  /// Number of loops, without the vertices where they meet.
   std::size_t loop_count() {
     std::size_t count = 0;
     for (std::uint32_t v = 0; v < vertices_.size(); ++v)

@@ -1,5 +1,5 @@
 #pragma once
-// What the tetrahedra of a piece cut out of a small sphere about their node.
+// Link of a node: intersection of the tetrahedra of one of its pieces with a small sphere.
 
 #include <array>
 #include <cstddef>

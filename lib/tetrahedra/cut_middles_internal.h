@@ -12,11 +12,12 @@ namespace gewebe {
 /// \throw Error if an edge of the region is curved
 void check_straight(const TetMesh& mesh, const CutRegion& region);
 
-/// Gives middles to the edges of all changed tetrahedra, to the wall and the surface. Edges between
-/// nodes that were joined before keep theirs, copies of such edges get copies of it, other edges
-/// new ones. `original` says of each corner which node it is, or is a copy of. \pre `cut` has its
-/// corners, and the middles before of the tetrahedra before \throw Error if there are too many
-/// nodes
+/// Adds middles of edges to all changed tetrahedra, to the wall and the surface. Edges between
+/// nodes that were joined before keep their middles, copies of such edges get copies, other edges
+/// get new middles.
+/// \param original  by corner: the former node that it is, or is a copy of
+/// \pre `cut` has its corners, and the former middles of the former tetrahedra
+/// \throw Error if there are too many nodes
 void add_middles(const TetMesh& before, std::span<const std::uint32_t> original, TetCut& cut);
 
 } // namespace gewebe

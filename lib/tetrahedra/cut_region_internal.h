@@ -1,6 +1,6 @@
 #pragma once
-// The tetrahedra near a blade: which edges it passes, which tetrahedra it separates, and all that
-// meet the ends of such edges, with nodes numbered among themselves.
+// Region near a blade: edges that it passes, tetrahedra that it separates, and all tetrahedra at
+// the ends of such edges, with local node numbers.
 
 #include "base/vec3.h"
 #include "tetrahedra/cut_blade_internal.h"
@@ -46,13 +46,14 @@ struct RegionTet {
   }
 };
 
+/// Tetrahedra and crossed edges near a blade.
 struct CutRegion {
   std::vector<CrossedEdge> edges;   ///< by the numbers of their ends in the mesh
   std::vector<RegionTet> tets;      ///< ascending: all with an end of a crossed edge, or more
   std::vector<std::uint32_t> nodes; ///< of each local node its number in the mesh, ascending
   std::vector<std::uint32_t> first; ///< star[first[n] … first[n+1]) of a local node:
   std::vector<std::uint32_t> star;  ///< tetrahedra of the region at it, ascending
-  std::vector<std::uint8_t> whole;  ///< are all tetrahedra at a local node in the region?
+  std::vector<std::uint8_t> whole;  ///< by local node: 1 if all its tetrahedra are in the region
   std::uint64_t tested = 0, folded = 0;
 
   std::span<const std::uint32_t> star_of(std::uint32_t node) const {
@@ -60,8 +61,9 @@ struct CutRegion {
   }
 };
 
-/// \param wide with the neighbours of what is at the ends of crossed edges
-/// \pre check_mesh(mesh) passes; options as cut_tetrahedra wants them
+/// Finds the region near a blade.
+/// \param wide  also the neighbours of the tetrahedra at the ends of crossed edges
+/// \pre check_mesh(mesh) passes; options as for cut_tetrahedra
 /// \throw Error as cut_tetrahedra
 CutRegion cut_region(const TetMesh& mesh, const BladeCutOptions& options, const Blade& blade,
                      bool wide);

@@ -1,5 +1,5 @@
 #pragma once
-// Which nodes stand in for crossings near them, so that no tetrahedron becomes too sharp.
+// Selection of nodes that replace crossings near them, so that no tetrahedron becomes too sharp.
 
 #include "tetrahedra/cut_region_internal.h"
 #include "tetrahedra/cut_split_internal.h"
@@ -13,7 +13,7 @@ namespace gewebe {
 /// By local nodes.
 struct SnappedRegion {
   std::vector<Vec3> points;         ///< at rest, some of them moved
-  std::vector<bool> on;             ///< does the wound pass through the node?
+  std::vector<bool> on;             ///< whether the wound passes through the node
   std::vector<std::uint32_t> along; ///< the crossed edge along which it was moved, or no_crossing
   std::uint64_t moved = 0, kept = 0;
   double largest_miss = 0;

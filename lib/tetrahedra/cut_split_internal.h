@@ -1,5 +1,5 @@
 #pragma once
-// Tetrahedra halved at nodes in their edges, and how sharp they become.
+// Bisection of tetrahedra at nodes in their edges, and the dihedral angles of the parts.
 
 #include "base/vec3.h"
 #include "tetrahedra/tet_mesh.h"

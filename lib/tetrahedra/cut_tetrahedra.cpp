@@ -276,7 +276,7 @@ private:
   TetCut cut_;
 };
 
-/// Nothing if a wider neighbourhood of the blade is wanted.
+/// Cuts near the blade; empty if a wider neighbourhood of the blade is needed.
 std::optional<TetCut> cut_near(const TetMesh& mesh, const Blade& blade,
                                const BladeCutOptions& options, bool wide) {
   const CutRegion region = cut_region(mesh, options, blade, wide);

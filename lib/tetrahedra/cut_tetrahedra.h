@@ -1,13 +1,13 @@
 #pragma once
-// Tetrahedral solids cut along a surface that a blade has swept, so that the wound has walls.
+// Cuts of tetrahedral solids along a surface swept by a blade, with walls of the wound.
 //
-// Where the blade passes through an edge a node is put into it, or a node close by is taken instead
-// (and moved onto the blade, where that is allowed and harms no shape), as isosurface stuffing does
-// (Labelle and Shewchuk 2007). Tetrahedra with such edges are halved edge by edge, in one order of
-// all edges, so that neighbours agree on the faces that they share. Faces between what lies above
-// the blade and what lies below are the wall; along them the tetrahedra round each node fall into
-// pieces, and each piece gets a node of its own (the virtual nodes of Molino, Bao and Fedkiw 2004,
-// without their overlap).
+// If the blade passes through an edge, a node is put into the edge, or a node close by is used, as
+// in isosurface stuffing (Labelle and Shewchuk 2007). The close node is moved onto the blade if
+// that is allowed and harms no shape. Tetrahedra with such edges are halved edge by edge, in one
+// order of all edges, so that neighbours agree on their common faces. Faces between tetrahedra
+// above and below the blade are the wall. They divide the tetrahedra round each node into pieces,
+// and each piece gets a node of its own (the virtual nodes of Molino, Bao and Fedkiw 2004, without
+// their overlap).
 
 #include "base/mesh.h"
 #include "tetrahedra/tet_mesh.h"
@@ -24,15 +24,15 @@ namespace gewebe {
 /// this, or those of the tetrahedron before do not either, and are no worse.
 inline constexpr double blade_cut_least_angle = 8;
 
-/// Of an edge's length: where the blade passes nearer to a node than this, the node is moved onto
-/// it, if it can be.
+/// Share of an edge's length. If the blade passes nearer to a node than this, the node is moved
+/// onto the blade, if possible.
 inline constexpr double blade_cut_snap = 0.3;
 
 struct BladeCutOptions {
   double snap = blade_cut_snap;               ///< 0 … 0.5
   double least_angle = blade_cut_least_angle; ///< 0 to below 60
-  /// Where the nodes are when the blade comes, if not at rest: empty, or one place per node. The
-  /// blade's points lie there; shapes, volumes and the result are those at rest.
+  /// Positions of the nodes at the time of the cut, one per node; empty: at rest. The blade's
+  /// points are in the same frame. Shapes, volumes and the result are those at rest.
   std::span<const Vec3> places = {};
   /// Nodes that must not be moved (they are doubled like others), in any order.
   std::span<const std::uint32_t> held = {};
@@ -43,7 +43,7 @@ struct BladeCutOptions {
   bool along_faces = false;
 };
 
-/// Where a node of the cut mesh stood before.
+/// Former position of a node of the cut mesh.
 struct TetNodeOrigin {
   static constexpr std::uint32_t none = UINT32_MAX;
 
@@ -54,11 +54,10 @@ struct TetNodeOrigin {
   bool operator==(const TetNodeOrigin&) const = default;
 };
 
-/// Both sides of the wound at one place: triangles of the same shape, which look into the wound
-/// from either tissue. `corners[s]` are counter-clockwise seen from outside of `tetrahedron[s]`;
-/// side 0 lies above the blade (where its triangles appear counter-clockwise), side 1 below.
-/// Corner k of side 0 and corner 2 - k of side 1 stand at one place. (Of an opened face, which is
-/// off the blade, either side is 0.)
+/// Pair of coincident triangles, one on each side of the wound. `corners[s]` are counter-clockwise
+/// seen from outside of `tetrahedron[s]`. Side 0 lies above the blade (where its triangles appear
+/// counter-clockwise), side 1 below. Corner k of side 0 and corner 2 - k of side 1 have the same
+/// position. (For an opened face, which is off the blade, either side may be side 0.)
 struct WallTriangle {
   std::array<Triangle, 2> corners{};
   std::array<Triangle, 2> middles{}; ///< of edges 01, 12, 20, where the mesh is quadratic
@@ -89,18 +88,18 @@ struct BladeCutReport {
   std::uint64_t rejoined = 0;  ///< faces that would have left tissue hanging by a node or an edge
 };
 
-/// Nodes and tetrahedra before keep their numbers; of a split tetrahedron the first part does.
-/// Behind them stand nodes in edges, by the ends of these, then copies, by their nodes; other
-/// parts, by the tetrahedron.
+/// Result of a cut. Former nodes and tetrahedra keep their numbers; the first part of a split
+/// tetrahedron keeps its number. New nodes come after the former ones: nodes in edges, by the ends
+/// of the edges, then copies, by their nodes. Other parts of tetrahedra follow by tetrahedron.
 struct TetCut {
   TetMesh mesh;
-  std::vector<TetNodeOrigin> origin;      ///< of each node
-  std::vector<std::uint32_t> tetrahedron; ///< of each: that before which it is (a part of)
+  std::vector<TetNodeOrigin> origin;      ///< by node
+  std::vector<std::uint32_t> tetrahedron; ///< by tetrahedron: the former one that it is (a part of)
   std::vector<WallTriangle> wall;
-  /// The boundary near the blade: takes the place of the faces that it
-  /// names; other faces stay. By tetrahedron before.
+  /// Boundary near the blade. It replaces the faces named by face_before; other faces stay. By
+  /// former tetrahedron.
   std::vector<CutFace> surface;
-  /// Tetrahedra before of which a corner has been moved or renamed, or which were split; ascending.
+  /// Former tetrahedra that were split, or have a corner that was moved or renamed; ascending.
   std::vector<std::uint32_t> changed;
   BladeCutReport report;
 };
@@ -109,27 +108,27 @@ struct TetCut {
 /// be flat: a quadrilateral between two places of an edge as two triangles, several in a row
 /// sharing their points.
 ///
-/// A tetrahedron is cut where the blade passes through edges so that its corners fall into two sets
-/// (signs by exact predicates; one exactly on the blade counts as on the side to which a step along
-/// x, else y, else z leads). One in which the blade ends is not cut, so that the wound ends at most
-/// an element before the blade does; nodes there are not doubled. Who cuts step by step passes each
-/// step with those before it back to the wound's end: nodes that stand on the blade already are
-/// found again. A second leaf of the blade within one edge is not seen (`folded`): pass leaves that
-/// close one after the other.
+/// A tetrahedron is cut if the blade passes through its edges so that its corners fall into two
+/// sets. Signs are those of exact predicates; a corner exactly on the blade counts as on the side
+/// to which a step along x, else y, else z leads. A tetrahedron in which the blade ends is not cut,
+/// so that the wound ends at most an element before the blade does; nodes there are not doubled. To
+/// cut step by step, pass each step together with the earlier ones back to the wound's end: nodes
+/// that are on the blade already are found again. A second leaf of the blade within one edge is
+/// ignored (`folded`): pass leaves that are so close in separate calls.
 ///
 /// The volume of each material stays, to rounding: a node on the boundary, or between materials, is
-/// moved only within all planes of such faces at it. Where no way to cut a tetrahedron keeps the
-/// least angle, the wall passes through the nearest node instead, which may miss the blade by up to
-/// half an edge (`kept`, `largest_miss`); at worst the wound follows the faces of the mesh.
+/// moved only within all planes of such faces at it. If no way to cut a tetrahedron keeps the least
+/// angle, the wall passes through the nearest node instead. That node may miss the blade by up to
+/// half an edge (`kept`, `largest_miss`). At worst the wound follows the faces of the mesh.
 ///
-/// Round each node the boundary is one fan of triangles afterwards if it was before: where the
-/// front of an earlier wound touches the wall, faces in between are opened (`opened`; they are of
-/// the wall, though not on the blade); elsewhere faces of the wall that would leave tissue hanging
-/// together by one node or one edge are joined again (`rejoined`).
+/// If the boundary round a node was one fan of triangles, it still is. If the front of an earlier
+/// wound touches the wall, faces between them are opened (`opened`; they belong to the wall, though
+/// they are not on the blade). Elsewhere, faces of the wall that would leave tissue connected by
+/// one node or one edge only are joined again (`rejoined`).
 ///
-/// Linear in the points and tetrahedra of the mesh with a small factor (boxes against those of the
-/// blade); everything beyond that is in proportion to the tetrahedra at nodes of edges that the
-/// blade passes. On one thread.
+/// Time is linear in the points and tetrahedra of the mesh with a small factor (tests of boxes),
+/// plus work in proportion to the tetrahedra at nodes of edges that the blade passes. It uses one
+/// thread.
 /// \pre check_mesh(mesh) passes
 /// \throw Error if an edge near the blade is curved (curved_edge); if a tetrahedron near the blade
 /// has no positive volume; if a point of the blade or a place is not finite or too far away (2^40
@@ -138,13 +137,13 @@ struct TetCut {
 TetCut cut_tetrahedra(const TetMesh& mesh, const TriangleMesh& blade,
                       const BladeCutOptions& options = {});
 
-/// The nodes before whose values make the value there, by the shape functions of the element, with
-/// their shares, sum 1. None of them has a share of 0.
+/// Former nodes that determine the value at a new node by the shape functions of the element, with
+/// their shares, sum 1. No share is 0.
 std::vector<std::pair<std::uint32_t, double>> shares_of(const TetMesh& before,
                                                         const TetNodeOrigin& origin);
 
-/// What has a value at each node before, at those of the cut mesh: by the shape functions of the
-/// elements before. \pre `field` has one value per node before
+/// Interpolates a field from the former nodes to those of the cut mesh, by the shape functions of
+/// the former elements. \pre `field` has one value per former node
 std::vector<Vec3> carry_over(const TetMesh& before, std::span<const TetNodeOrigin> origin,
                              std::span<const Vec3> field);
 

@@ -148,7 +148,7 @@ private:
       if (!mend_pinches(round < rounds_of_opening))
         break;
     }
-    // Who lost its last face of the wall is whole.
+    // A node that lost its last face of the wall is in one piece.
     std::erase_if(result_.nodes, [](const PartedRegion::Piece& n) { return n.pieces == 1; });
   }
 

@@ -17,7 +17,7 @@ struct TetPart {
   std::uint32_t parent = 0;                 ///< of the region
   std::int8_t side = 0;                     ///< 1 above the blade, -1 below, 0 not said
   std::array<std::uint32_t, 4> neighbour{}; ///< 4 part + k across face k, or no_neighbour
-  std::array<bool, 4> wall{};               ///< is face k on the wall?
+  std::array<bool, 4> wall{};               ///< whether face k is on the wall
   std::array<std::uint32_t, 4> piece{};     ///< of each corner: its number among the node's pieces
 };
 

@@ -1,6 +1,6 @@
 #pragma once
-// The faces and edges of tetrahedra, with those that meet in each: what all questions about
-// neighbours and the boundary ask.
+// Tables of the faces and edges of tetrahedra, with the tetrahedra at each: the base of all
+// algorithms for neighbours and the boundary.
 
 #include "base/mesh.h"
 #include "tetrahedra/tet_mesh.h"

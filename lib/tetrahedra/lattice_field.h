@@ -1,6 +1,6 @@
 #pragma once
-// Vectors at the nodes of tetrahedra, interpolated at the places of a lattice, as finite elements
-// do.
+// Interpolation of vectors from the nodes of tetrahedra to a lattice, by the elements' shape
+// functions.
 
 #include "base/context.h"
 #include "base/vec3.h"

@@ -1,5 +1,5 @@
 #pragma once
-// How well tetrahedra are shaped for computing on them, and what a mesh of them consists of.
+// Quality and statistics of a tetrahedral mesh.
 
 #include "mesh/quality.h"
 #include "tetrahedra/boundary.h"

@@ -1,5 +1,5 @@
 #pragma once
-// The tetrahedral mesh that the stages exchange.
+// Tetrahedral mesh, the data exchanged between stages.
 
 #include "base/mesh.h"
 #include "base/vec3.h"
@@ -10,8 +10,8 @@
 
 namespace gewebe {
 
-/// A tetrahedral mesh. Tetrahedra have a positive volume, (b - a) × (c - a) · (d - a) > 0, where a
-/// checked mesh is asked for. An optional array is either empty or has the size given here.
+/// A tetrahedral mesh. Functions that require a checked mesh need positive volumes, (b - a) × (c -
+/// a) · (d - a) > 0. An optional array is either empty or has the size given here.
 struct TetMesh {
   std::vector<Vec3> points;            ///< millimetres
   std::vector<Tetrahedron> tetrahedra; ///< corner indices into `points`
