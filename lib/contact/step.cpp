@@ -201,7 +201,7 @@ StepSolver::Work::Step StepSolver::Work::take_step(const CondensedSystem& system
   }
   if (!std::isfinite(result.length))
     throw NotSolved("contact: Newton's step is not finite");
-  result.free = candidates_.free_part(at_, trial_, result.length);
+  result.free = candidates_.free_part(at_, trial_);
   if (!(result.free > stuck))
     throw NotSolved("contact: a prescribed motion meets fixed nodes near " +
                     place_text(energy_.nearest(at_).second));

@@ -48,17 +48,19 @@ void SweptCandidates::search(std::span<const Vec3> from, std::span<const Vec3> t
   filter_.reset(candidates_, vertices_, from_);
 }
 
-double SweptCandidates::free_part(std::span<const Vec3> from, std::span<const Vec3> to,
-                                  double longest) {
+double SweptCandidates::free_part(std::span<const Vec3> from, std::span<const Vec3> to) {
   const double d_hat = island_.activation_distance;
   const collision::Separation separation{0, parameters_.kept_gap, d_hat, max_advances};
-  const auto part_of = [&](double range, double t_max) {
-    return collision::collision_free_step(island_.surface, near(from, range), from, to, separation,
-                                          t_max);
+  const auto part_of = [&](double t_max, std::span<const double> steps) {
+    return collision::collision_free_step(island_.surface, near(from, d_hat, steps), from, to,
+                                          separation, t_max);
   };
   // Pairs in contact limit the way most. Behind them few others remain to be looked at.
-  const double most = part_of(d_hat, 1);
-  return part_of(d_hat + 2 * most * longest, most);
+  const double most = part_of(1, {});
+  steps_.assign(from.size(), 0);
+  for (const std::uint32_t v : vertices_)
+    steps_[v] = most * norm(to[v] - from[v]);
+  return part_of(most, steps_);
 }
 
 bool SweptCandidates::keep_gaps(std::span<const Vec3> from, std::span<const Vec3> to) const {

@@ -30,12 +30,13 @@ public:
   std::uint64_t searches() const { return searches_; }
 
   /// Candidates whose gap at x may be `range` or less. \return valid until the next call
-  const collision::Candidates& near(std::span<const Vec3> x, double range) {
-    return filter_.select(island_.surface, x, range);
+  const collision::Candidates& near(std::span<const Vec3> x, double range,
+                                    std::span<const double> steps = {}) {
+    return filter_.select(island_.surface, x, range, steps);
   }
   /// Largest part of the ways along which no surfaces use up more than a part of their gap.
-  /// \param longest  way of any vertex
-  double free_part(std::span<const Vec3> from, std::span<const Vec3> to, double longest);
+  /// \pre only vertices() have ways
+  double free_part(std::span<const Vec3> from, std::span<const Vec3> to);
   /// Whether that is all of the ways.
   bool keep_gaps(std::span<const Vec3> from, std::span<const Vec3> to) const;
   /// Whether no surfaces meet on these ways.
@@ -55,6 +56,7 @@ private:
   collision::CandidateFilter filter_;
   std::vector<std::uint32_t> vertices_;
   std::vector<Vec3> from_, way_;
+  std::vector<double> steps_; ///< by vertex of the island, of the last ways
   std::uint64_t searches_ = 0;
 };
 

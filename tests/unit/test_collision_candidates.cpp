@@ -422,17 +422,26 @@ TEST(CandidateFilter, SelectsWhatMeasuringAllSelects) {
     for (Vec3& p : x)
       p += size * random_point(random, 1);
     const double range = step % 3 == 0 ? 0.5 : 0.05;
+    std::vector<double> steps; // of some calls
+    for (std::size_t v = 0; step % 2 == 1 && v < x.size(); ++v)
+      steps.push_back(0.1 * std::abs(random_point(random, 1).x));
     Candidates expected;
     const auto look = [&](const auto& list, bool edges, auto& to) {
-      for (const auto& pair : list)
-        if (gap_at(surface, x, pair, edges) <= range)
+      for (const auto& pair : list) {
+        double sides[2] = {0, 0};
+        for (std::size_t k = 0; k < pair.size() && !steps.empty(); ++k) {
+          double& side = sides[k < (edges ? 2U : 1U) ? 0 : 1];
+          side = std::max(side, steps[pair[k]]);
+        }
+        if (gap_at(surface, x, pair, edges) <= range + sides[0] + sides[1])
           to.push_back(pair);
+      }
     };
     look(all.point_point, false, expected.point_point);
     look(all.point_edge, false, expected.point_edge);
     look(all.edge_edge, true, expected.edge_edge);
     look(all.point_triangle, false, expected.point_triangle);
-    const Candidates& near = filter.select(surface, x, range);
+    const Candidates& near = filter.select(surface, x, range, steps);
     EXPECT_EQ(near.point_point, expected.point_point) << step;
     EXPECT_EQ(near.point_edge, expected.point_edge) << step;
     EXPECT_EQ(near.edge_edge, expected.edge_edge) << step;
