@@ -311,6 +311,7 @@ private:
   static Output::Options text(Output::Options options) {
     options.sync = true;
     options.binary = false;
+    options.beside = true;
     return options;
   }
 
