@@ -312,7 +312,7 @@ test_a_signal_ends_a_run_whose_pipe_has_no_reader() {
   for signal in INT TERM HUP; do
     env --default-signal=INT timeout -s KILL 60 ffe-run in.scene --to csv -o fifo >answers 2>message &
     pid=$!
-    while ! grep -qs done answers; do sleep 0.05; done
+    while ! grep -qs 'done' answers; do sleep 0.05; done
     sleep 0.3
     kill -"$signal" "$(pgrep -P "$pid")"
     status=0
