@@ -278,7 +278,13 @@ std::optional<CutModel> cut_by_plane(const World& w, std::size_t index, const Pl
 
 /// \throw Error where it parts nothing
 CutModel plane_through(const World& w, std::size_t index, const PlaneToCut& plane) {
-  std::optional<CutModel> cut = cut_by_plane(w, index, plane);
+  std::optional<CutModel> cut;
+  try {
+    cut = cut_by_plane(w, index, plane);
+  } catch (const MeetingOfNoSheets& error) {
+    throw Error("the skin can't be cut there: " + std::string(error.what()) +
+                ": another plane, or a model without its skin (exp2ela --no-skin)");
+  }
   if (!cut)
     throw Error("the plane through " + number_text(plane.plane.point.x) + " " +
                 number_text(plane.plane.point.y) + " " + number_text(plane.plane.point.z) +
