@@ -6,11 +6,10 @@
 #include "model/build.h"
 #include "model/figures.h"
 #include "tools/shared/cli.h"
-#include "tools/shared/mesh_size.h"
 #include "tools/shared/model_arguments.h"
 #include "tools/shared/model_fit.h"
+#include "tools/shared/model_source.h"
 #include "tools/shared/net_source.h"
-#include "tools/shared/solid_source.h"
 #include "tools/shared/space_option.h"
 #include "tools/shared/transform_option.h"
 
@@ -37,70 +36,10 @@ std::vector<Kind> all_inputs() {
   return kinds;
 }
 
-void refuse(bool wrong, const char* what) {
-  if (wrong)
-    throw UsageError(what);
-}
-
 void fix(Model& model, const ModelArguments& a) {
   const auto load = [](const std::string& name) { return Input(name, false).read_all(); };
   for (const auto node : select_nodes(model, *a.fixed, load, SelectorScope::body))
     model.nodes[node].fixed |= *fixed_axes_from_name(a.axes);
-}
-
-/// \param space  gets the space that the model is in
-Model source(cli::Run& run, const ModelArguments& a, Space& space) {
-  const std::optional<Affine> map =
-      a.transform.empty() ? std::nullopt : std::optional(transform_from_text(a.transform));
-  space = space_from_name(a.space);
-  if (a.matrix) {
-    require_parts(a.build.material, {});
-    const double nodes = static_cast<double>(a.matrix->m) * a.matrix->n;
-    require_memory(run.context(),
-                   nodes * static_cast<double>(sizeof(Vec3) + 2 * sizeof(Triangle)) +
-                       (a.solid ? 0 : model_bytes(nodes, 2 * nodes, a.build.bend)),
-                   "the primitive");
-    TriangleMesh mesh = primitive_mesh(*a.matrix);
-    if (map)
-      apply(*map, mesh);
-    return cli::model_of_surface(run, a.primitive, std::move(mesh), a);
-  }
-  Input input(a.mesh);
-  const Kind from = input_kind(input.peek(4096), a.mesh, run.format());
-  // No given option may be ignored.
-  refuse(from == Kind::ela && (!a.unit.empty() || a.weld != "auto" || !a.repair.empty() ||
-                               a.order != 2 || a.solid || a.build != BuildOptions{}),
-         "the input is a model, expected a mesh for options that build one");
-  if (from == Kind::ela) {
-    Space stated = Space::unknown;
-    Model model = run.timed("read", [&] { return read_ela(input, run.context(), &stated); });
-    space = result_space(stated, a.space);
-    Affine whole;
-    if (spaces_differ(stated, space))
-      whole.m[0] = whole.m[5] = -1;
-    if (map)
-      whole = *map * whole;
-    if (whole != Affine{})
-      at(input.name(), [&] { apply(whole, model); });
-    return model;
-  }
-  const bool tetrahedra = holds_tetrahedra(input.peek(4096), from);
-  refuse(a.solid && tetrahedra, "--solid: the input holds tetrahedra already, expected a surface");
-  if (tetrahedra)
-    return cli::solid_source(run, input, from, a);
-  refuse(!a.solid && (a.values.poisson || a.order != 2),
-         "the input is a surface, expected --solid beside --poisson and --order");
-  const MeshReadOptions options{.kind = from,
-                                .unit = a.unit,
-                                .weld = weld_from_name(a.weld),
-                                .max_memory = run.context().max_memory};
-  TriangleMesh mesh = run.timed("read", [&] { return read_mesh(input, options); });
-  if (map)
-    at(input.name(), [&] { apply(*map, mesh); });
-  at(input.name(), [&] { require_parts(a.build.material, mesh.part); });
-  if (a.unit.empty())
-    cli::warn_of_size(run, input.name(), mesh, {});
-  return cli::model_of_surface(run, input.name(), std::move(mesh), a);
 }
 
 void hold_step(cli::Run& run, Model& model, const ModelArguments& a) {
@@ -124,7 +63,7 @@ void work(cli::Run& run, ModelArguments& a) {
   const Kind to = output_kind(run.to(), run.output(), Kind::ela, and_ela(writable_mesh_kinds()));
   Output output(run.output(), run.output_options(is_binary(to)));
   Space space = Space::unknown;
-  Model model = source(run, a, space);
+  Model model = cli::model_source(run, a, space);
   if (!a.name.empty())
     model.name = a.name;
   if (a.fixed)

@@ -203,8 +203,10 @@ public:
       textured_ = textured_ || scene_.mMeshes[m]->HasTextureCoords(0);
     if (scene_.mRootNode != nullptr)
       visit(*scene_.mRootNode, root);
-    if (parts_ < 2)
+    if (parts_ < 2) {
       mesh_.part.clear();
+      stats_.part_names.clear();
+    }
     if (materials_.size() < 2)
       mesh_.material.clear();
     stats = stats_;
@@ -225,11 +227,14 @@ private:
   }
 
   std::int32_t part_of(const aiNode& node) {
-    if (kind_ != Kind::obj || node.mName.length == 0)
-      return parts_++;
-    const auto [entry, fresh] = named_.try_emplace(node.mName.C_Str(), parts_);
-    parts_ += fresh;
-    return entry->second;
+    const std::string name(node.mName.C_Str());
+    if (kind_ == Kind::obj && !name.empty()) {
+      const auto [entry, fresh] = named_.try_emplace(name, parts_);
+      if (!fresh)
+        return entry->second;
+    }
+    stats_.part_names.push_back(name);
+    return parts_++;
   }
 
   void add(const aiMesh& from, const aiNode& node, const Affine& transform,
@@ -425,8 +430,7 @@ TriangleMesh import(const AssimpSource& source, AssimpStats& stats) {
 // ---- the pipe
 
 struct WireHead {
-  std::uint64_t points, triangles, texcoords, part, material;
-  AssimpStats stats;
+  std::uint64_t points, triangles, texcoords, part, material, polygons, skipped, names;
 };
 
 template <class T>
@@ -448,8 +452,12 @@ void take(std::string_view& bytes, std::uint64_t count, std::vector<T>& values) 
 }
 
 std::string to_wire(const TriangleMesh& mesh, const AssimpStats& stats) {
-  const WireHead head{mesh.points.size(), mesh.triangles.size(), mesh.texcoords.size(),
-                      mesh.part.size(),   mesh.material.size(),  stats};
+  std::string names; // each with a 0 behind it, which none holds
+  for (const std::string& name : stats.part_names)
+    names.append(name.c_str(), name.size() + 1);
+  const WireHead head{mesh.points.size(),       mesh.triangles.size(), mesh.texcoords.size(),
+                      mesh.part.size(),         mesh.material.size(),  stats.polygons,
+                      stats.skipped_primitives, names.size()};
   std::string bytes;
   bytes.reserve(sizeof head + mesh.points.size() * sizeof(Vec3) +
                 mesh.triangles.size() * (sizeof(Triangle) + 8) +
@@ -460,7 +468,7 @@ std::string to_wire(const TriangleMesh& mesh, const AssimpStats& stats) {
   append(bytes, mesh.texcoords);
   append(bytes, mesh.part);
   append(bytes, mesh.material);
-  return bytes;
+  return bytes + names;
 }
 
 // The child may have been corrupted by its input: nothing of it is believed unchecked.
@@ -476,11 +484,16 @@ TriangleMesh from_wire(std::string_view bytes, AssimpStats* stats) {
   take(bytes, head.texcoords, mesh.texcoords);
   take(bytes, head.part, mesh.part);
   take(bytes, head.material, mesh.material);
-  if (!bytes.empty())
+  if (bytes.size() != head.names || (!bytes.empty() && bytes.back() != '\0'))
     throw Error("the reader's answer is broken");
   check_mesh(mesh);
-  if (stats != nullptr)
-    *stats = head.stats;
+  if (stats != nullptr) {
+    *stats = {head.polygons, head.skipped, {}};
+    for (std::string_view name; !bytes.empty(); bytes.remove_prefix(name.size() + 1)) {
+      name = bytes.substr(0, bytes.find('\0'));
+      stats->part_names.emplace_back(name);
+    }
+  }
   return mesh;
 }
 

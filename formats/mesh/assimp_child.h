@@ -9,6 +9,7 @@
 #include <cstdint>
 #include <string>
 #include <string_view>
+#include <vector>
 
 namespace gewebe {
 
@@ -21,6 +22,7 @@ struct AssimpSource {
 struct AssimpStats {
   std::uint64_t polygons = 0;           ///< faces with more than three corners, cut into triangles
   std::uint64_t skipped_primitives = 0; ///< points, lines and polygons that collapse to them
+  std::vector<std::string> part_names;  ///< of each part, "" where it has none; empty: no parts
 };
 
 /// The triangles and the points that they use. For OBJ, STL and DXF assimp gives each corner a

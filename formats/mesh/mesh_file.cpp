@@ -85,6 +85,7 @@ TriangleMesh read_unwelded(const std::string& bytes, const Input& input,
   TriangleMesh mesh = read_by_assimp(source, &counts);
   stats.polygons = counts.polygons;
   stats.skipped_primitives = counts.skipped_primitives;
+  stats.part_names = std::move(counts.part_names);
   return mesh;
 }
 
@@ -168,7 +169,7 @@ TriangleMesh read_mesh(Input& input, const MeshReadOptions& options, MeshReadSta
     counts.weld = weld(mesh, welding);
     counts.parts = count_parts(mesh);
     if (stats != nullptr)
-      *stats = counts;
+      *stats = std::move(counts);
     return mesh;
   });
 }

@@ -47,6 +47,8 @@ struct MeshReadStats {
   std::uint64_t skipped_elements = 0;   ///< of a PLY header
   std::uint64_t skipped_properties = 0; ///< of a PLY header
   std::uint64_t parts = 0; ///< different part numbers; 1 if the mesh has none, 0 if it is empty
+  /// Names of parts by their numbers, as the file has them (DXF layers, OBJ groups); "": none.
+  std::vector<std::string> part_names;
   WeldResult weld;
 };
 

@@ -104,7 +104,7 @@ void write_companion(const std::string& result) {
   const hdf5::File file = hdf5::File::open_own(result);
   if (file.root().has("VTKHDF"))
     return;
-  Output output(xdmf_path(result), {.sync = true, .binary = false});
+  Output output(xdmf_path(result), {.sync = true, .binary = false, .beside = true});
   write_xdmf(file, result.substr(result.find_last_of('/') + 1),
              [&](std::string_view text) { output.write(text); });
   output.commit();

@@ -38,6 +38,11 @@ std::vector<float> in_single(std::span<const double> values, const char* what, c
   return result;
 }
 
+/// A row under the name by which the XDMF file knows it.
+void create_frame_view(hdf5::Group& views, const hdf5::Dataset& set, std::uint64_t row) {
+  views.create_row_view(frame_view_name(set.name(), row), set, row);
+}
+
 /// Those of a solid, as they grow.
 struct FieldSets {
   hdf5::Dataset stress, strain, von_mises, element_stress, element_strain, element_von_mises;
@@ -50,6 +55,13 @@ struct FieldSets {
         element_strain(tensors(group, "element_strain", elements)),
         element_von_mises(numbers(group, "element_von_mises", elements)), first(from) {
     group.set("first_frame", from);
+  }
+
+  /// Those of one frame under names of their own.
+  void show_row(hdf5::Group& views, std::uint64_t row) const {
+    for (const hdf5::Dataset* const set :
+         {&stress, &strain, &von_mises, &element_stress, &element_strain, &element_von_mises})
+      create_frame_view(views, *set, row);
   }
 
   void append(const SolidFields& fields) {
@@ -139,6 +151,9 @@ public:
       }
       cut.write("origin", from);
       object.displacement = add_shape(cut, model);
+      object.views.reset();
+      if (stands_alone())
+        object.views.emplace(cut.create_group("frames"));
       ++object.shapes;
       object.fields.reset();
       object.shape_group = std::move(cut);
@@ -147,6 +162,7 @@ public:
 
   void set_instruments(std::span<const FrameInstrument> instruments) override {
     in_place([&] { instruments_.add_frame(file_->root(), frames_, instruments); });
+    instrumented_ = instrumented_ || !instruments.empty();
     for (const FrameInstrument& instrument : instruments)
       xdmf_bytes_ += xdmf_bytes(output_.name(), std::string(instrument.name), false);
   }
@@ -165,6 +181,11 @@ public:
                               fields->element_stress.size(), frames_);
           }
           to.fields->append(*fields);
+        }
+        if (stands_alone()) {
+          create_frame_view(*to.views, to.displacement, to.displacement.rows() - 1);
+          if (objects[i].fields)
+            to.fields->show_row(*to.views, to.fields->stress.rows() - 1);
         }
         xdmf_bytes_ += xdmf_bytes(output_.name(), to.name, objects[i].fields != nullptr);
         const std::span<const NodeVector> forces = objects[i].forces;
@@ -220,7 +241,11 @@ private:
     std::uint64_t shapes = 1;                     ///< that it had, one after the other
     std::optional<hdf5::Group> cuts, shape_group; ///< and, of one that was cut, of its last shape
     std::optional<FieldSets> fields;
+    std::optional<hdf5::Group> views; ///< of the last shape's frames, while the object is alone
   };
+
+  /// Whether a frame is one mesh, as readers want it that know of no other.
+  bool stands_alone() const { return objects_.size() == 1 && !instrumented_; }
 
   Object& begin(const std::string& name, const Model& model) {
     hdf5::Group group = groups_->create_group(name);
@@ -237,8 +262,11 @@ private:
     hdf5::Dataset force = forces.create_growing("force", hdf5::Number::float64, {3}, 512);
     objects_.push_back({name, std::move(group), std::move(displacement), std::move(frame),
                         std::move(node), std::move(force), 1, std::nullopt, std::nullopt,
-                        std::nullopt});
-    return objects_.back();
+                        std::nullopt, std::nullopt});
+    Object& object = objects_.back();
+    if (stands_alone())
+      object.views.emplace(object.group.create_group("frames"));
+    return object;
   }
 
   /// What stands in a group of a model at rest; the displacements to come.
@@ -311,6 +339,7 @@ private:
   static Output::Options text(Output::Options options) {
     options.sync = true;
     options.binary = false;
+    options.beside = true;
     return options;
   }
 
@@ -366,6 +395,7 @@ private:
   std::optional<hdf5::Group> groups_;
   std::vector<Object> objects_;
   InstrumentSets instruments_;
+  bool instrumented_ = false; ///< some frame had an instrument
   std::uint64_t frames_ = 0;
   std::uint64_t xdmf_bytes_ = 0, xdmf_reserved_ = 0; ///< of the text so far, at most
 };

@@ -3,6 +3,7 @@
 #include "base/number_text.h"
 #include "formats/results/result_groups_internal.h"
 
+#include <algorithm>
 #include <optional>
 #include <span>
 #include <vector>
@@ -23,6 +24,9 @@ public:
   /// or two numbers.
   std::string row(const std::string& path, std::uint64_t row, std::uint64_t count,
                   const std::string& dimensions, int bytes = 4) const;
+  /// The same as a dataset of its own, see frame_view_name. `frames` is the path of its group.
+  std::string view(const std::string& frames, const char* set, std::uint64_t row,
+                   const std::string& dimensions) const;
   /// The same as an attribute. `type` is "Vector", say, `center` "Node", "Cell" or "Grid".
   static std::string attribute(const char* name, const char* type, const char* center,
                                const std::string& row);
@@ -67,6 +71,12 @@ std::string XdmfText::row(const std::string& path, std::uint64_t row, std::uint6
          "</DataItem>\n";
 }
 
+std::string XdmfText::view(const std::string& frames, const char* set, std::uint64_t row,
+                           const std::string& dimensions) const {
+  return array(frames + "/" + frame_view_name(set, row), dimensions,
+               R"(NumberType="Float" Precision="4")");
+}
+
 std::string XdmfText::attribute(const char* name, const char* type, const char* center,
                                 const std::string& row) {
   return std::string("<Attribute Name=\"") + name + "\" AttributeType=\"" + type + "\" Center=\"" +
@@ -87,6 +97,7 @@ struct Shape {
   std::uint64_t first = 0, rows = 0; ///< frames
   std::uint64_t nodes = 0, triangles = 0, tetrahedra = 0;
   bool quadratic = false;
+  bool views = false;                             ///< of each row, see frame_view_name
   std::uint64_t first_fields = 0, field_rows = 0; ///< frames with fields
 };
 
@@ -124,6 +135,7 @@ Shape read_shape(const hdf5::Group& group) {
     shape.tetrahedra = tetrahedra.rows();
     shape.quadratic = tetrahedra.row_size() == 10;
   }
+  shape.views = group.has("frames");
   if (group.has("fields")) {
     const hdf5::Group fields = group.group("fields");
     shape.first_fields = first_frame(fields);
@@ -173,14 +185,33 @@ std::vector<Instrument> read_instruments(const hdf5::Group& root) {
   return read;
 }
 
-std::string object_grid(const XdmfText& xdmf, const Object& object, std::uint64_t frame) {
+std::string time_text(double time) {
+  return "<Time Value=\"" + number_text(time) + "\"/>\n";
+}
+
+/// Whether each frame is one mesh, and each of its arrays a dataset: for meshio and others that
+/// know no collection of grids and no part of a dataset.
+bool is_one_mesh(const std::vector<Object>& objects, const std::vector<Instrument>& instruments) {
+  return objects.size() == 1 && instruments.empty() && objects.front().shapes.front().first == 0 &&
+         std::ranges::all_of(objects.front().shapes, &Shape::views);
+}
+
+/// \param time of a grid that is a frame by itself, and not one of several in a frame
+std::string object_grid(const XdmfText& xdmf, const Object& object, std::uint64_t frame,
+                        const std::optional<double>& time) {
   std::size_t which = 0;
   while (which + 1 < object.shapes.size() && object.shapes[which + 1].first <= frame)
     ++which;
   const Shape& shape = object.shapes[which];
   const std::string& group = shape.path;
   const std::string n = std::to_string(shape.nodes);
-  std::string text = "<Grid Name=\"" + object.name + "\" GridType=\"Uniform\">\n";
+  const auto row = [&](const std::string& of, const char* set, std::uint64_t at, std::uint64_t rows,
+                       const std::string& dimensions) {
+    return time ? xdmf.view(group + "/frames", set, at, dimensions)
+                : xdmf.row(of + "/" + set, at, rows, dimensions);
+  };
+  std::string text =
+      "<Grid Name=\"" + object.name + "\" GridType=\"Uniform\">\n" + (time ? time_text(*time) : "");
   if (shape.tetrahedra > 0) { // nodes are in VTK's order, which is that of its reader
     text += xdmf.topology(shape.quadratic ? "Tetrahedron_10" : "Tetrahedron", group + "/tetrahedra",
                           shape.tetrahedra, shape.quadratic ? 10 : 4);
@@ -193,18 +224,18 @@ std::string object_grid(const XdmfText& xdmf, const Object& object, std::uint64_
   } else {
     text += "<Topology TopologyType=\"Polyvertex\" NumberOfElements=\"" + n + "\"/>\n";
   }
-  text += "<Geometry GeometryType=\"XYZ\">\n" +
-          xdmf.array(group + "/points", n + " 3", R"(NumberType="Float" Precision="8")") +
-          "</Geometry>\n" +
-          XdmfText::attribute(
-              "displacement", "Vector", "Node",
-              xdmf.row(group + "/displacement", frame - shape.first, shape.rows, n + " 3"));
+  text +=
+      "<Geometry GeometryType=\"XYZ\">\n" +
+      xdmf.array(group + "/points", n + " 3", R"(NumberType="Float" Precision="8")") +
+      "</Geometry>\n" +
+      XdmfText::attribute("displacement", "Vector", "Node",
+                          row(group, "displacement", frame - shape.first, shape.rows, n + " 3"));
   if (shape.field_rows > 0 && frame >= shape.first_fields) {
     const auto field = [&](const char* name, const char* set, bool tensor, bool of_nodes) {
       const std::string count = of_nodes ? n : std::to_string(shape.tetrahedra);
       text += XdmfText::attribute(name, tensor ? "Tensor6" : "Scalar", of_nodes ? "Node" : "Cell",
-                                  xdmf.row(group + "/fields/" + set, frame - shape.first_fields,
-                                           shape.field_rows, tensor ? count + " 6" : count));
+                                  row(group + "/fields", set, frame - shape.first_fields,
+                                      shape.field_rows, tensor ? count + " 6" : count));
     };
     field("stress", "stress", true, true);
     field("strain", "strain", true, true);
@@ -250,20 +281,28 @@ void write_xdmf(const hdf5::File& result, const std::string& name,
   const std::vector<Object> objects = read_objects(root.group("objects"));
   const std::vector<Instrument> instruments = read_instruments(root);
   const XdmfText xdmf(name);
-  write("<?xml version=\"1.0\" ?>\n<Xdmf Version=\"2.0\">\n<Domain>\n"
+  const bool one = is_one_mesh(objects, instruments);
+  write("<?xml version=\"1.0\" ?>\n<Xdmf Version=\"3.0\">\n<Domain>\n"
         "<Grid Name=\"run\" GridType=\"Collection\" CollectionType=\"Temporal\">\n");
   for (std::uint64_t f = 0; f < times.size(); ++f) {
-    write("<Grid Name=\"scene\" GridType=\"Collection\" CollectionType=\"Spatial\">\n"
-          "<Time Value=\"" +
-          number_text(times[f]) + "\"/>\n");
+    if (one) {
+      write(object_grid(xdmf, objects.front(), f, times[f]));
+      continue;
+    }
+    write("<Grid Name=\"scene\" GridType=\"Collection\" CollectionType=\"Spatial\">\n" +
+          time_text(times[f]));
     for (const Object& object : objects)
       if (object.shapes.front().first <= f)
-        write(object_grid(xdmf, object, f));
+        write(object_grid(xdmf, object, f, std::nullopt));
     for (const Instrument& instrument : instruments)
       write(instrument_grid(xdmf, instrument, f));
     write("</Grid>\n");
   }
   write("</Grid>\n</Domain>\n</Xdmf>\n");
+}
+
+std::string frame_view_name(const std::string& set, std::uint64_t row) {
+  return set.substr(set.find_last_of('/') + 1) + "_" + std::to_string(row);
 }
 
 std::string xdmf_path(const std::string& path) {

@@ -15,6 +15,10 @@ namespace gewebe {
 void write_xdmf(const hdf5::File& result, const std::string& name,
                 const std::function<void(std::string_view)>& write);
 
+/// Name of the view of a row of the dataset `set` (hdf5::Group::create_row_view), in the group
+/// "frames" of its shape.
+std::string frame_view_name(const std::string& set, std::uint64_t row);
+
 /// Its path beside a result: PATH with the suffix .xdmf.
 std::string xdmf_path(const std::string& path);
 

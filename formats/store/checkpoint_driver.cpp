@@ -344,7 +344,7 @@ int Driver::write_log(std::uint64_t start, std::uint64_t end) {
 }
 
 int Driver::checkpoint() {
-  if (!discarding && failure != 0)
+  if (failure != 0)
     return give_up(failure);
   if (discarding || !written)
     return 0;

@@ -451,6 +451,24 @@ Dataset Group::create_growing(const std::string& name, Number type, const Shape&
   return {std::move(handle), file_, path_of(name), shape, type};
 }
 
+void Group::create_row_view(const std::string& name, const Dataset& of, std::uint64_t row) {
+  const std::vector<hsize_t> dims = dims_of(of.shape());
+  std::vector<hsize_t> first(dims.size()), count = dims;
+  first[0] = row;
+  count[0] = 1;
+  const Handle from(H5Screate_simple(static_cast<int>(dims.size()), dims.data(), nullptr));
+  const Handle to(H5Screate_simple(static_cast<int>(dims.size()) - 1, dims.data() + 1, nullptr));
+  const Handle made = properties(H5P_DATASET_CREATE);
+  Handle handle(-1);
+  if (H5Sselect_hyperslab(from.id(), H5S_SELECT_SET, first.data(), nullptr, count.data(),
+                          nullptr) >= 0 &&
+      H5Pset_virtual(made.id(), to.id(), ".", of.name().c_str(), from.id()) >= 0)
+    handle = Handle(H5Dcreate2(handle_.id(), name.c_str(), file_type(of.type()), to.id(),
+                               H5P_DEFAULT, made.id(), H5P_DEFAULT));
+  if (handle.id() < 0)
+    fail_write("dataset '" + name + "' cannot be made");
+}
+
 namespace {
 
 /// That an array stands in this file, whole and as it is: its size is no bare claim.

@@ -205,6 +205,10 @@ public:
   /// Of 0 rows; `row_shape` is the shape of one row, `rows_per_chunk` how many are kept together.
   Dataset create_growing(const std::string& name, Number type, const Shape& row_shape,
                          std::uint64_t rows_per_chunk = 1);
+  /// Row `row` of `of`, a dataset of this file, under a name of its own (a virtual dataset, which
+  /// holds no bytes of its own), for readers that can't take a part of a dataset.
+  /// \pre row < of.rows()
+  void create_row_view(const std::string& name, const Dataset& of, std::uint64_t row);
   /// Whether there is a dataset of this name and type.
   bool holds(const std::string& name, Number type) const;
   /// \throw Error too if it isn't of `type`, or its size exceeds what the file holds: every number

@@ -270,8 +270,26 @@ struct Output::State final : std::streambuf {
     throw Error(name, what + ": " + error_text(errno));
   }
 
+  /// -1 and errno as open(2). A FIFO waits for its reader, until a deferred signal ends the
+  /// program.
+  int open_device() const {
+    const int wake = deferred_signal_descriptor();
+    for (;;) {
+      const int opened = ::open(name.c_str(), O_WRONLY | O_CLOEXEC | (wake < 0 ? 0 : O_NONBLOCK));
+      if (opened >= 0) {
+        (void)::fcntl(opened, F_SETFL, ::fcntl(opened, F_GETFL) & ~O_NONBLOCK);
+        return opened;
+      }
+      if (wake < 0 || (errno != ENXIO && errno != EINTR))
+        return -1;
+      pollfd signal{wake, POLLIN, 0};
+      (void)::poll(&signal, 1, 20);
+      check_deferred_signal();
+    }
+  }
+
   void open_direct() {
-    fd = ::open(name.c_str(), O_WRONLY | O_CLOEXEC);
+    fd = open_device();
     if (fd < 0)
       fail("cannot open for writing");
     if (options.binary && ::isatty(fd) != 0)
@@ -453,6 +471,8 @@ Output::Output(const std::string& path, const Options& options)
     throw Error(path, "is a directory, expected a file");
   if (!state.existed && errno != ENOENT)
     state.fail("cannot open for writing");
+  if (state.existed && !S_ISREG(info.st_mode) && options.beside)
+    throw Error(path, "is no regular file, expected one, or a new name, beside the result");
   if (state.existed && !S_ISREG(info.st_mode)) {
     if (options.binary && S_ISCHR(info.st_mode) && path.starts_with("/dev/tty"))
       throw UsageError(path + " is a terminal, expected a file or a pipe");

@@ -71,6 +71,9 @@ public:
     bool sync = false;  ///< fsync before the rename
     bool part = false;  ///< the temporary file is FILE.part, may be kept, and is taken up again
     bool binary = true; ///< refuse a terminal
+    /// A file that is written beside the result (a log, a record, statistics, a companion): a FIFO
+    /// or a device is refused, since one without a reader would hold up the result.
+    bool beside = false;
     /// If not empty, the temporary file is FILE.part, too; one that an earlier run left, which
     /// begins with these bytes, is overwritten.
     std::string log{};

@@ -53,7 +53,9 @@ TetMesh read_tetgen(Input& input, std::uint64_t max_memory) {
 void write_tetgen(Output& output, const TetMesh& mesh, const Output::Options& options) {
   const TetgenFiles names = tetgen_names(output.name());
   const bool nodes = names.node == output.name();
-  Output beside(nodes ? names.ele : names.node, options);
+  Output::Options of_beside = options;
+  of_beside.beside = true;
+  Output beside(nodes ? names.ele : names.node, of_beside);
   const auto to = [](Output& file) {
     return [&file](std::string_view piece) { file.write(piece); };
   };

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <charconv>
+#include <optional>
 
 namespace gewebe {
 
@@ -39,6 +40,70 @@ std::int32_t chosen_material(const MaterialChoice& choice, std::int32_t part) {
   return part >= 0 && p < choice.of_part.size() ? choice.of_part[p] : 0;
 }
 
+namespace {
+
+/// The first of the words, and whether there are more.
+std::string listed(const std::vector<std::string>& words) {
+  constexpr std::size_t told = 8;
+  std::string list;
+  for (std::size_t k = 0; k < std::min(words.size(), told); ++k)
+    list += (k == 0 ? "" : ", ") + words[k];
+  return (words.size() == 1 ? "expected " : "expected one of ") + list +
+         (words.size() > told ? " ..." : "");
+}
+
+/// Gives a part its material. \return false if it has one
+bool choose(MaterialChoice& choice, std::int32_t part, std::int32_t material) {
+  const auto at = std::ranges::lower_bound(choice.named, part);
+  if (at != choice.named.end() && *at == part)
+    return false;
+  choice.named.insert(at, part);
+  const auto p = static_cast<std::size_t>(part);
+  if (p >= choice.of_part.size())
+    choice.of_part.resize(p + 1);
+  choice.of_part[p] = material;
+  return true;
+}
+
+constexpr std::int32_t max_parts = 4096;
+
+/// Nothing of a word that is the name of a part. \throw Error for a number out of range
+std::optional<std::int32_t> part_number(std::string_view word) {
+  std::int32_t part = -1;
+  const auto [rest, status] = std::from_chars(word.data(), word.data() + word.size(), part);
+  if (word.empty() || (rest == word.data() + word.size() &&
+                       (status != std::errc{} || part < 0 || part >= max_parts)))
+    throw Error("no part '" + std::string(word) + "', expected 0 to " +
+                std::to_string(max_parts - 1) + ", or the name of one");
+  return rest == word.data() + word.size() ? std::optional(part) : std::nullopt;
+}
+
+} // namespace
+
+void number_parts(MaterialChoice& choice, std::span<const std::string> names) {
+  for (const auto& [name, material] : choice.by_name) {
+    bool there = false;
+    for (std::size_t p = 0; p < names.size(); ++p) {
+      if (names[p] != name)
+        continue;
+      there = true;
+      if (p >= static_cast<std::size_t>(max_parts) ||
+          !choose(choice, static_cast<std::int32_t>(p), material))
+        throw Error("part " + std::to_string(p) + ", which is '" + name +
+                    "', has two materials, expected one");
+    }
+    std::vector<std::string> known(names.begin(), names.end());
+    std::ranges::sort(known);
+    known.erase(std::ranges::unique(known).begin(), known.end());
+    std::erase(known, "");
+    if (!there)
+      throw Error(
+          "there is no part '" + name + "' to give a material, " +
+          (known.empty() ? "expected its number, since parts have no names here" : listed(known)));
+  }
+  choice.by_name.clear();
+}
+
 void require_parts(const MaterialChoice& choice, std::span<const std::int32_t> parts) {
   std::vector<std::int32_t> there(parts.begin(), parts.end());
   if (there.empty())
@@ -47,21 +112,17 @@ void require_parts(const MaterialChoice& choice, std::span<const std::int32_t> p
   there.erase(std::ranges::unique(there).begin(), there.end());
   for (const std::int32_t part : choice.named)
     if (!std::ranges::binary_search(there, part)) {
-      constexpr std::size_t told = 8;
-      std::string list;
-      for (std::size_t k = 0; k < std::min(there.size(), told); ++k)
-        list += (k == 0 ? "" : ", ") + std::to_string(there[k]);
-      throw Error("there is no part " + std::to_string(part) + " to give a material, expected " +
-                  (there.size() == 1 ? "" : "one of ") + list +
-                  (there.size() > told ? " ..." : ""));
+      std::vector<std::string> numbers;
+      for (const std::int32_t number : there)
+        numbers.push_back(std::to_string(number));
+      throw Error("there is no part " + std::to_string(part) + " to give a material, " +
+                  listed(numbers));
     }
 }
 
 MaterialChoice parse_material_choice(std::string_view text, const std::vector<Material>& table) {
-  constexpr std::int32_t max_parts = 4096;
   MaterialChoice choice;
   choice.materials.push_back(material_named("generic", table));
-  std::vector<bool> named;
   for (bool first = true;; first = false) {
     const std::size_t comma = std::min(text.find(','), text.size());
     const std::string_view word = text.substr(0, comma);
@@ -71,31 +132,20 @@ MaterialChoice parse_material_choice(std::string_view text, const std::vector<Ma
         throw Error("surplus material '" + std::string(word) + "', expected PART=NAME");
       choice.materials[0] = material_named(word, table);
     } else {
-      std::int32_t part = -1;
-      const auto [rest, status] = std::from_chars(word.data(), word.data() + sign, part);
-      if (status != std::errc{} || rest != word.data() + sign || part < 0 || part >= max_parts)
-        throw Error("no part '" + std::string(word.substr(0, sign)) + "', expected 0 to " +
-                    std::to_string(max_parts - 1));
-      const auto p = static_cast<std::size_t>(part);
-      if (p >= named.size()) {
-        named.resize(p + 1);
-        choice.of_part.resize(p + 1);
-      }
-      if (named[p])
-        throw Error("part " + std::to_string(part) + " has two materials, expected one");
-      named[p] = true;
+      const std::string_view part = word.substr(0, sign);
+      const std::optional<std::int32_t> number = part_number(part);
       const Material material = material_named(word.substr(sign + 1), table);
       auto found = std::find(choice.materials.begin(), choice.materials.end(), material);
       if (found == choice.materials.end())
         found = choice.materials.insert(found, material);
-      choice.of_part[p] = static_cast<std::int32_t>(found - choice.materials.begin());
+      const auto of = static_cast<std::int32_t>(found - choice.materials.begin());
+      if (!number)
+        choice.by_name.emplace_back(part, of);
+      else if (!choose(choice, *number, of))
+        throw Error("part " + std::to_string(*number) + " has two materials, expected one");
     }
-    if (comma == text.size()) {
-      for (std::size_t p = 0; p < named.size(); ++p)
-        if (named[p])
-          choice.named.push_back(static_cast<std::int32_t>(p));
+    if (comma == text.size())
       return choice;
-    }
     text.remove_prefix(comma + 1);
   }
 }

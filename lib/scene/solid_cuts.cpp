@@ -28,15 +28,12 @@ constexpr std::size_t most_edges = 256;
 constexpr std::array sheet_shifts{0.0, 0.13, 0.29, 0.41}; // of its cell, one after the other
 constexpr double row_step = 0.25; // of a sheet's cell, at least, between rows that are kept
 
-/// What would no longer be where it is if it were moved: displaced, grasped, tied.
+/// What would no longer be where it is if it were moved: displaced, as grasped nodes are too, and
+/// tied.
 std::vector<std::uint32_t> held_nodes(const World& w, std::size_t index) {
   std::vector<std::uint32_t> held;
   for (const auto& [node, u] : w.now.objects[index].load->displacement)
     held.push_back(node);
-  for (const Instrument& i : w.now.instruments)
-    for (const Instrument::Grip& grip : i.grips)
-      if (grip.object == index)
-        held.push_back(grip.node);
   for (const Tie& tie : w.now.ties) {
     if (tie.object == index)
       held.push_back(tie.node);
@@ -279,7 +276,13 @@ std::optional<CutModel> cut_by_plane(const World& w, std::size_t index, const Pl
 
 /// \throw Error where it parts nothing
 CutModel plane_through(const World& w, std::size_t index, const PlaneToCut& plane) {
-  std::optional<CutModel> cut = cut_by_plane(w, index, plane);
+  std::optional<CutModel> cut;
+  try {
+    cut = cut_by_plane(w, index, plane);
+  } catch (const MeetingOfNoSheets& error) {
+    throw Error("the skin can't be cut there: " + std::string(error.what()) +
+                ": another plane, or a model without its skin (exp2ela --no-skin)");
+  }
   if (!cut)
     throw Error("the plane through " + number_text(plane.plane.point.x) + " " +
                 number_text(plane.plane.point.y) + " " + number_text(plane.plane.point.z) +

@@ -19,4 +19,10 @@ struct LostParts {
 /// not lost. Faces without a finite size are left out.
 LostParts find_lost_parts(const TriangleMesh& mesh, const Grid& grid);
 
+/// The share of the surface's area, 0 to 1, with no voxel inside nearer than two voxels along each
+/// axis, from five thousand samples that are spread evenly over the area. So it is the share of
+/// walls that are too thin for the voxels, wherever they break over more than a few voxels. 0 for a
+/// surface without area.
+double lost_surface(const TriangleMesh& mesh, const Grid& grid);
+
 } // namespace gewebe

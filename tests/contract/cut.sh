@@ -95,3 +95,32 @@ test_incision_opens_and_the_lobe_falls() {
   grep -q '^part liver liver.1 ' lobe.answers || fail 'no lobe came off'
   make -s clean
 }
+
+# Where the skin passes through itself no curve parts it: the line says so and the scene goes on; without a skin, or as a
+# net, the same body is cut there.
+test_a_cut_where_the_surface_passes_through_itself() {
+  need ffe-run exp2ela
+  { echo 'object o two.ela'; printf 'cut o plane 4.5 0 0 1 0 0%s\n' '' ' along=faces'; printf '%s\n' 'step 0.01' 'cut o plane 1 0 0 1 0 0.1' 'step 0.01'; } >in.scene
+  exp2ela -q --primitive sphere:32x20 --size 10 --to obj |
+    awk '$1 == "v" { points[++n] = $2 " " $3 " " $4; x[n] = $2; y[n] = $3; z[n] = $4 }
+      $1 == "f" { for (k = 2; k < 5; ++k) { split($k, a, "/"); f[3 * m + k] = a[1] } ++m }
+      END { for (i = 1; i <= n; ++i) print "v", points[i]
+        for (i = 1; i <= n; ++i) print "v", x[i] + 9, y[i] + 0.37, z[i] + 0.21
+        for (b = 0; b <= n; b += n) for (t = 0; t < m; ++t) print "f", f[3 * t + 2] + b, f[3 * t + 3] + b, f[3 * t + 4] + b }' >two.obj
+  local method
+  exp2ela -q --solid --rule winding --cell 2 --unit mm --fix 'x<-4' two.obj -o two.ela
+  for method in ffe ela; do
+    sed "1s/$/ method=$method/" in.scene | ffe-run --serve >answers 2>message && fail 'a wrong line is none'
+    [[ $(grep -c '^error [23]: object o: the skin can.t be cut there: ' answers) == 2 ]] || fail "$(<answers)"
+    [[ $(grep '^error' answers | sed 's/.*expected //' | sort -u) == 'two sheets: another plane, or a model without its skin (exp2ela --no-skin)' ]] || fail "$(<answers)"
+    [[ $(grep -c '^step ' answers) == 2 && $(grep -c '^cut o springs 0 doubled ' answers) == 1 ]] || fail 'it does not go on:' "$(<answers)"
+  done
+  # Elements alone, and the net: a result.
+  exp2ela -q --solid --no-skin --rule winding --cell 2 --unit mm --fix 'x<-4' two.obj -o two.ela
+  sed -i '3d' in.scene
+  ffe-run --serve in.scene >answers || fail "$(<answers)"
+  [[ $(grep -c '^cut o springs 0 doubled ' answers) == 2 ]] || fail "$(<answers)"
+  exp2ela -q --unit mm --fix 'x<-4' two.obj -o two.ela
+  ffe-run --serve in.scene >answers || fail "$(<answers)"
+  [[ $(grep -c '^cut o springs ' answers) == 2 && $(grep -c '^part o o.1 ' answers) -ge 1 ]] || fail "$(<answers)"
+}

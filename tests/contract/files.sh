@@ -263,3 +263,67 @@ test_a_packed_volume_is_refused_by_its_size() {
   voxelize --label 1 --max-memory 2G bomb.nrrd >out 2>message && fail 'it is unpacked'
   [[ $(<message) == *'(--max-memory)' ]] || fail "$(<message)"
 }
+
+# Without a reader a FIFO would hold up the result, and a device keeps nothing: what is written beside a result is a regular file.
+test_pipes_and_devices_are_no_files_beside_a_result() {
+  local tool side
+  mkfifo fifo
+  for tool in $(programs); do
+    sample "$tool"
+    [[ $tool != ffe-precompute ]] || words+=(--columns all)
+    for side in fifo /dev/null; do
+      expect_failure 1 "$tool" timeout 60 "${words[@]}" "--stats=$side" -o "$(target "$tool")"
+      [[ ! -e $(target "$tool") ]] || fail "$tool left its result"
+    done
+  done
+  sample ffe-run
+  for tool in --record --events --latencies; do
+    for side in fifo /dev/full; do
+      expect_refusal ffe-run "$side" timeout 60 ffe-run "$tool" "$side" in.scene -o out.h5
+      [[ -z $(ls -A out* .out* ./*.part 2>/dev/null) ]] || fail "$tool left files"
+    done
+  done
+  # Companions of a result.
+  mkfifo run.xdmf mesh.node
+  expect_refusal ffe-run run.xdmf timeout 60 ffe-run in.scene -o run.h5
+  printf '0 0 0 4\n' | metaball2vol --voxel 1 -o in.vdb
+  expect_refusal mc-opt mesh.node timeout 60 mc-opt --tets in.vdb -o mesh.ele
+  [[ ! -e run.h5 && ! -e mesh.ele ]] || fail 'half a result'
+  # A model that a scene writes.
+  object=$(sed -n 's/^object \([^ ]*\) .*/\1/p' in.scene | head -1)
+  { cat in.scene && echo "emit model $object fifo"; } >export.scene
+  timeout 60 ffe-run export.scene >answers 2>message && fail "a model was written to a FIFO"
+  grep -q 'fifo: is no regular file, expected one, or a new name' message || fail "$(<message)"
+}
+
+# As expect_failure 1, and FILE is what the message is about: expect_refusal TOOL FILE COMMAND...
+expect_refusal() {
+  local tool=$1 file=$2 status=0
+  shift 2
+  "$@" >answers 2>message || status=$?
+  ((status == 1)) || fail "status $status, expected 1: $*" "$(<message)"
+  [[ $(<message) == "$tool: $file: is no regular file, expected one, or a new name, beside the result" ]] || fail "$(<message)"
+}
+
+test_a_signal_ends_a_run_whose_pipe_has_no_reader() {
+  local signal pid status
+  sample ffe-run
+  mkfifo fifo
+  for signal in INT TERM HUP; do
+    env --default-signal=INT timeout -s KILL 60 ffe-run in.scene --to csv -o fifo >answers 2>message &
+    pid=$!
+    while ! grep -qs 'done' answers; do sleep 0.05; done
+    sleep 0.3
+    kill -"$signal" "$(pgrep -P "$pid")"
+    status=0
+    wait "$pid" || status=$?
+    ((status == 128 + $(kill -l "$signal"))) || fail "status $status on SIG$signal" "$(<message)"
+  done
+  # A reader that comes late has all of it.
+  ffe-run in.scene --to csv -o fifo >answers &
+  sleep 0.3
+  cat fifo >late
+  wait $!
+  ffe-run in.scene --to csv -o whole >answers
+  cmp late whole
+}

@@ -78,8 +78,7 @@ test_vtk_reads_the_tetrahedra() {
 import sys, vtk
 quadratic = sys.argv[1] == '2'
 r = vtk.vtkXdmfReader(); r.SetFileName('run.xdmf'); r.UpdateInformation(); r.UpdateTimeStep(1)
-it = r.GetOutputDataObject(0).NewIterator()
-grid = it.GetCurrentDataObject()
+grid = r.GetOutputDataObject(0)
 assert grid.GetNumberOfCells() == 192, grid
 types = {grid.GetCellType(c) for c in range(192)}
 assert types == {24 if quadratic else 10}, types
@@ -439,4 +438,56 @@ test_a_soft_ball_stands_on_a_small_support() {
   ffe-run --stats=stats.json stand.scene >answers.txt 2>warnings || fail 'finds no shape' "$(<warnings)"
   [[ ! -s warnings ]] || fail 'warns' "$(<warnings)"
   awk -F '"warp_change":' '{ exit !($2 + 0 > 0 && $2 + 0 <= 1e-3) }' stats.json || fail 'the rounds do not end' "$(<stats.json)"
+}
+
+# A python3 that has meshio and h5py; PYTHON may name one.
+python_with_meshio() {
+  local python
+  for python in "${PYTHON:-python3}" python3 /usr/bin/python3; do
+    if "$python" -c 'import meshio, h5py' 2>/dev/null; then
+      echo "$python"
+      return
+    fi
+  done
+  return 1
+}
+
+# meshio takes one mesh a frame, and whole datasets alone.
+test_meshio_reads_the_frames_of_an_object() {
+  need ffe-run exp2ela
+  local python
+  python=$(python_with_meshio) || skip 'no meshio with h5py for python3'
+  cat >in.py <<'P'
+import h5py, meshio, sys
+group, cells, frames, stress = sys.argv[1], sys.argv[2], int(sys.argv[3]), sys.argv[4] == 'stress'
+with meshio.xdmf.TimeSeriesReader('run.xdmf') as r, h5py.File('run.h5') as f:
+    points, blocks = r.read_points_cells()
+    o = f[group]
+    assert (points == o['points'][:]).all() and blocks[0].type == cells, (points, blocks)
+    assert r.num_steps == frames == len(f['time']), r.num_steps
+    for k in range(frames):
+        t, node, cell = r.read_data(k)
+        assert t == f['time'][k], (k, t)
+        assert (node['displacement'] == o['displacement'][k]).all(), k
+        first = o['fields'].attrs['first_frame'] if stress else frames
+        assert ('stress' in node) == (k >= first), (k, list(node))
+        if k >= first:
+            for name, of in (('stress', node), ('von_mises', node), ('element_strain', cell)):
+                array = of[name] if of is node else of[name][0]
+                assert (array == o['fields'][name][k - first]).all(), (k, name)
+P
+  solid_scene 2
+  sed -i '$a emit stress gel\nstep 0.1\nstep 0.1' bend.scene
+  ffe-run -q bend.scene -o run.h5
+  "$python" in.py /objects/gel tetra10 5 stress
+  printf 'OFF\n4 4 0\n0 0 0\n1 0 0\n0 1 0\n0 0 1\n3 0 2 1\n3 0 1 3\n3 1 2 3\n3 0 3 2\n' | exp2ela --format off -o net.ela
+  printf '%s\n' 'object net net.ela' 'step' 'displace net 3 0 0 0.1' 'step' >net.scene
+  ffe-run -q net.scene -o run.h5
+  "$python" in.py /objects/net triangle 3 none
+  # Nor does it need all of them: those of a run that fails.
+  echo 'nonsense' >>net.scene
+  ffe-run -q net.scene -o run.h5 2>message && fail 'a wrong line passes'
+  mv run.partial.h5 run.h5
+  sed 's/run.partial.h5/run.h5/' run.partial.xdmf >run.xdmf
+  "$python" in.py /objects/net triangle 3 none
 }

@@ -7,9 +7,11 @@
 
 #include <gtest/gtest.h>
 
+#include <csignal>
 #include <filesystem>
 #include <span>
 #include <string>
+#include <sys/resource.h>
 #include <vector>
 
 namespace gewebe {
@@ -55,6 +57,54 @@ TEST(Checkpoints, WhatIsNotInACheckpointIsNotInTheFile) {
   made.abandon();
   bool refused = true;
   EXPECT_EQ(rows_after_restoring(file.path(), refused), 2000U);
+}
+
+/// Files of this process can't be longer while it lives, as on a full disk.
+class FileLimit {
+public:
+  explicit FileLimit(std::uint64_t bytes) {
+    (void)std::signal(SIGXFSZ, SIG_IGN);
+    (void)::getrlimit(RLIMIT_FSIZE, &old_);
+    rlimit now = old_;
+    now.rlim_cur = bytes;
+    (void)::setrlimit(RLIMIT_FSIZE, &now);
+  }
+  ~FileLimit() { (void)::setrlimit(RLIMIT_FSIZE, &old_); }
+  FileLimit(const FileLimit&) = delete;
+  FileLimit& operator=(const FileLimit&) = delete;
+
+private:
+  rlimit old_{};
+};
+
+// Large frames leave the room that was reserved, so that their own bytes can't be written, before
+// any log of the checkpoint is.
+TEST(Checkpoints, AFrameThatFindsNoRoomIsTold) {
+  for (const std::size_t size : {100U, 20000U, 60000U}) {
+    const ScratchFile file(".h5");
+    hdf5::File made = hdf5::File::create_with_checkpoints(file.path());
+    hdf5::Dataset rows = made.root().create_growing("rows", hdf5::Number::float64, {}, 1024);
+    const std::vector<double> some(size, 1.5);
+    std::uint64_t frames = 0;
+    bool told = false;
+    {
+      const FileLimit limit(1U << 20);
+      while (!told && frames < 2000) {
+        try {
+          rows.append(std::span<const double>(some));
+          made.checkpoint();
+          ++frames;
+        } catch (const Error&) {
+          told = true;
+        }
+      }
+    }
+    EXPECT_TRUE(told) << size;
+    EXPECT_GT(frames, 0U) << size;
+    made.abandon();
+    bool refused = true;
+    EXPECT_EQ(rows_after_restoring(file.path(), refused), frames * size) << size;
+  }
 }
 
 TEST(Checkpoints, PartialNamesKeepTheSuffix) {

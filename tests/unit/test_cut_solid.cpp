@@ -126,6 +126,31 @@ TEST_P(CutSolid, HoldsWhatStandsBetweenHeldNodes) {
     }
 }
 
+/// Drag per mass of a node is the mean of the nodes that it stands between.
+TEST_P(CutSolid, DragOfNewNodesIsTheMeanOfTheirParents) {
+  Model model = box_model(GetParam());
+  for (std::size_t n = 0; n < model.nodes.size(); ++n)
+    model.nodes[n].drag = model.nodes[n].mass * static_cast<double>(1 + n % 7);
+  const SolidCut cut = checked_cut(model, half_way());
+  std::size_t several = 0;
+  for (std::size_t n = 0; n < cut.model.nodes.size(); ++n) {
+    const TetNodeOrigin& from = cut.origin[n];
+    const Node& node = cut.model.nodes[n];
+    double rate = 0;
+    int parents = 0;
+    for (std::size_t k = 0; from.node == TetNodeOrigin::none && k < 4; ++k)
+      if (from.weights[k] != 0) {
+        rate += static_cast<double>(1 + model.tetrahedra[from.tetrahedron][k] % 7);
+        ++parents;
+      }
+    if (from.node != TetNodeOrigin::none)
+      rate = static_cast<double>(1 + from.node % 7);
+    EXPECT_NEAR(node.drag / node.mass, rate / std::max(parents, 1), 1e-9) << n;
+    several += parents > 1 ? 1 : 0;
+  }
+  EXPECT_GT(several, 3U);
+}
+
 Vec3 centre(const Model& model, std::size_t triangle) {
   Vec3 sum;
   for (const std::uint32_t corner : model.triangles[triangle])

@@ -507,9 +507,32 @@ TEST(ModelBuild, PartsHaveTheirOwnMaterials) {
 
   EXPECT_EQ(parse_material_choice("0=uterus,3=liver").of_part,
             (std::vector<std::int32_t>{1, 0, 0, 2}));
-  for (const char* bad : {"", "bone", "liver,uterus", "0=liver,0=uterus", "-1=liver", "x=liver",
+  for (const char* bad : {"", "bone", "liver,uterus", "0=liver,0=uterus", "-1=liver", "=liver",
                           "1=", "liver,", "1=liver,uterus", "99999999=liver"})
     EXPECT_THROW(parse_material_choice(bad), Error) << bad;
+}
+
+TEST(ModelBuild, PartsAreChosenByNameToo) {
+  const std::vector<std::string> names{"lobe", "bile duct", "", "lobe"};
+  MaterialChoice choice = parse_material_choice("uterus,lobe=liver,1=gallbladder");
+  EXPECT_EQ(choice.named, (std::vector<std::int32_t>{1}));
+  number_parts(choice, names);
+  EXPECT_EQ(choice.named, (std::vector<std::int32_t>{0, 1, 3}));
+  for (const auto& [part, material] :
+       {std::pair(0, "liver"), {1, "gallbladder"}, {2, "uterus"}, {3, "liver"}, {4, "uterus"}})
+    EXPECT_EQ(choice.materials[static_cast<std::size_t>(chosen_material(choice, part))].name,
+              material);
+  EXPECT_EQ(choice, parse_material_choice("uterus,0=liver,1=gallbladder,3=liver"));
+  const auto fault = [&](const char* text, const std::vector<std::string>& of) {
+    MaterialChoice wrong = parse_material_choice(text);
+    return test::complaint([&] { number_parts(wrong, of); });
+  };
+  EXPECT_EQ(fault("duct=liver", names),
+            "there is no part 'duct' to give a material, expected one of bile duct, lobe");
+  EXPECT_EQ(fault("duct=liver", {}), "there is no part 'duct' to give a material, expected its "
+                                     "number, since parts have no names here");
+  EXPECT_EQ(fault("lobe=liver,3=uterus", names),
+            "part 3, which is 'lobe', has two materials, expected one");
 }
 
 TEST(ModelBuild, NormalsAndTextureCoordinates) {

@@ -212,6 +212,34 @@ TEST_P(SolidCuts, CutsDoNotMoveTiedNodes) {
   }
 }
 
+/// Nor displaced nodes, nor grasped ones.
+TEST_P(SolidCuts, CutsDoNotMoveHeldNodes) {
+  const Model first = bar(GetParam());
+  const auto near =
+      nodes_where(first, [](const Vec3& p) { return p.x > 7.8 - 1.5 && p.x < 7.8 + 1.5; });
+  const CutObject cut{0, PlaneToCut{{{7.8, 0, 0}, {1, 0.02, 0.01}}, {}}};
+  for (const int held : {0, 1, 2}) {
+    Simulation s(one_thread(), {});
+    s.add_object("bar", first, Method::ela);
+    if (held == 1)
+      s.apply(SetDisplacement{0, near, {}});
+    if (held == 2) {
+      InstrumentShape tip;
+      tip.radius = 0.1;
+      s.apply(SetInstrument{0, tip, {{7.8, 50, 0}, {}}, "tongs"});
+      s.apply(Grasp{0, near, 0});
+    }
+    s.apply(cut);
+    const std::span<const std::uint32_t> places = s.object(0).places;
+    const auto moved = std::ranges::count_if(near, [&](std::uint32_t node) {
+      const std::uint32_t now = places.empty() ? node : places[node];
+      return now != CutModel::gone &&
+             !(s.model(0).nodes[now].position == first.nodes[node].position);
+    });
+    EXPECT_EQ(moved > 0, held == 0) << held << ": " << moved;
+  }
+}
+
 TEST_P(SolidCuts, ABladeCutsInOneStepAndInMany) {
   for (const Method method : {Method::ffe, Method::ela})
     for (const int steps : {1, 7, 40}) {

@@ -234,6 +234,41 @@ TEST(SolidTearLoads, StressAveragesUseOneMaterial) {
   }
 }
 
+/// The mean strain along x is what the end has moved by, over the length, however the elements
+/// share the volume.
+TEST(SolidTearLoads, MeansAreByVolume) {
+  Model model = pulled_bar(false, 4, false);
+  std::vector<double> u;
+  for (Node& node : model.nodes) {
+    double& x = node.position.x;
+    x = x * x / length; // short elements at one end
+    u.insert(u.end(), {0.001 * x * x, 0, 0});
+  }
+  const double mean = 0.001 * length;
+  const std::optional<SolidTear> tear =
+      find_tear(model, u, StrainFrames::resting, {false, {0.5 * mean}, 10 * length});
+  ASSERT_TRUE(tear.has_value());
+  EXPECT_NEAR(tear->share, 2, 0.02);
+}
+
+/// A bar that is turned and pulled tears across itself: the plane is that of the body at rest.
+TEST(SolidTearLoads, ThePlaneOfATurnedBarIsThatAtRest) {
+  for (const bool quadratic : {false, true}) {
+    const Model model = pulled_bar(quadratic, 2, true);
+    std::vector<double> u;
+    for (const Node& node : model.nodes) { // a quarter turn about z, 10 % longer
+      const Vec3 &p = node.position, now{-p.y, 1.1 * p.x, p.z};
+      u.insert(u.end(), {now.x - p.x, now.y - p.y, now.z - p.z});
+    }
+    const std::optional<SolidTear> tear =
+        find_tear(model, u, StrainFrames::elements, {false, {0.5, 0.05}, 0});
+    ASSERT_TRUE(tear.has_value());
+    EXPECT_NEAR(tear->share, 2, 1e-6);
+    const Vec3 normal = tear->plane.normal / norm(tear->plane.normal);
+    EXPECT_NEAR(std::abs(normal.x), 1, 1e-6);
+  }
+}
+
 TEST_P(SolidTears, ANotchGoesOnFromItsFront) {
   Simulation s(one_thread(), {});
   s.add_object("bar", pulled_bar(GetParam(), 4, false), Method::ffe);

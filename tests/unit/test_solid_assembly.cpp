@@ -304,6 +304,32 @@ TEST(SolidAssembly, StrainsUnderGravityRotateWithTheBody) {
   EXPECT_LT(worst, 0.02 * size); // the rotation that bubbles add to is the corner's own
 }
 
+/// u = (0, a x², 0) turns a body by a x about z, and shears it by as much. In turning frames the
+/// strain at a corner is turned by the rotation of that corner.
+TEST(SolidAssembly, StrainsOfABentBodyTurnAtEachCorner) {
+  TetMesh mesh = test::distorted_box();
+  make_quadratic(mesh);
+  const std::vector<SolidMaterial> material{{2500, 0.3, 1e-3}};
+  const auto elements = solid_elements(mesh, material);
+  constexpr double a = 0.7;
+  std::vector<double> u;
+  for (const Vec3& p : mesh.points)
+    u.insert(u.end(), {0, a * p.x * p.x, 0});
+  const auto plain = solid_strains(mesh, material, elements, u),
+             found = solid_strains(mesh, material, elements, u, {}, StrainFrames::turning);
+  double size = 0, worst = 0;
+  for (std::size_t t = 0; t < elements.size(); ++t)
+    for (std::size_t p = 0; p < 4; ++p) {
+      const double x = mesh.points[mesh.tetrahedra[t][p]].x, shear = plain[t][p][1];
+      EXPECT_NEAR(shear, a * x, 0.1);
+      size = test::larger(size, std::abs(shear));
+      worst = test::larger(worst, std::abs(found[t][p][0] + std::sin(2 * a * x) * shear));
+      worst = test::larger(worst, std::abs(found[t][p][1] - std::cos(2 * a * x) * shear));
+    }
+  EXPECT_GT(size, 1);
+  EXPECT_LT(worst, 0.1 * size); // bubbles strain and turn it, too
+}
+
 TEST(SolidAssembly, VonMisesIsThatOfTensionShearAndPressure) {
   EXPECT_DOUBLE_EQ(von_mises({0, 0, 0, -30, 0, 0}), 30);
   EXPECT_DOUBLE_EQ(von_mises({5, 0, 0, 35, 0, 5}), 30); // a pressure adds nothing

@@ -181,6 +181,23 @@ TEST(YoungFit, NamesAnOutlierAmongFew) {
   EXPECT_EQ(fit.outliers, std::vector<std::string>{"point 2"});
 }
 
+/// The fit follows a far point, since it moves most: so its residual is small, and is compared with
+/// what the fit leaves of it (the leverage).
+TEST(YoungFit, NamesAnOutlierThatTheFitFollows) {
+  const test::Solid truth = bar(30000, 30000);
+  const std::array<std::size_t, 1> first{0};
+  for (const double error : {0.0, 0.028}) {
+    MeasuredCase c = measured(truth, 2000, 0.01);
+    for (Measurement& m : c.measurements)
+      m.displacement[0] = m.displacement[1] = std::nullopt;
+    *c.measurements[4].displacement[2] += error;
+    const YoungFit fit =
+        fit_young(truth.mesh, truth.materials, names, first, truth.fixed, std::span(&c, 1));
+    EXPECT_EQ(fit.outliers,
+              error > 0 ? std::vector<std::string>{"point 4"} : std::vector<std::string>{});
+  }
+}
+
 TEST(YoungFit, NamesBadData) {
   const test::Solid s = bar(30000, 30000);
   const MeasuredCase good = measured(s, 2000, 0);

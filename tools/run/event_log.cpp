@@ -50,6 +50,7 @@ constexpr std::string_view columns =
 
 Output::Options as_log(Output::Options options) {
   options.log = columns;
+  options.beside = true;
   return options;
 }
 

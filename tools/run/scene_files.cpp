@@ -151,6 +151,7 @@ SceneFiles scene_files(const std::string& scene, const Context& context,
     Output::Options whole;
     whole.binary = false;
     whole.sync = true;
+    whole.beside = true;
     Output output(resolve(name), whole);
     write_ela(output, model, context);
     output.commit();

@@ -25,6 +25,7 @@ fs::path folder_of(const std::string& file) {
 Output::Options as_part(Output::Options options) {
   options.part = true;
   options.binary = false;
+  options.beside = true;
   return options;
 }
 

@@ -32,6 +32,7 @@ std::size_t StepLatency::bin(double seconds) {
 void StepLatency::log_to(const std::string& path, const Output::Options& options) {
   Output::Options log = options;
   log.log = "step,time,latency\n";
+  log.beside = true;
   log_.emplace(path, log);
   log_->write(log.log);
 }

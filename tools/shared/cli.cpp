@@ -316,7 +316,7 @@ void Program::carry_out(const std::function<void(Run&)>& work) {
   }
   std::optional<Output> stats_output; // before the work, so that a clash of names ends it
   if (!s.stats_file.empty())
-    stats_output.emplace(s.stats_file, Output::Options{.binary = false});
+    stats_output.emplace(s.stats_file, Output::Options{.binary = false, .beside = true});
   work(run);
   run.progress_bar_ = nullptr;
   bar.reset();
