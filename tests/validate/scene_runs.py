@@ -415,7 +415,7 @@ def surfaces(models, shapes, changed):
         base = len(points)
         points += shape
         owner += [k] * len(shape)
-        triangles += [tuple(n + base for n in t) for t in (changed.get(name) or models[name].triangles)]
+        triangles += [tuple(n + base for n in t) for t in (changed[name] if name in changed else models[name].triangles)]
     return points, triangles, owner
 
 
