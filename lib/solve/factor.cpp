@@ -415,8 +415,8 @@ void solve_unit_axes(const StiffnessMatrix& matrix, const Factor& factor,
       continue;
     const std::size_t width = factor.solve_units(places, x);
     for (std::size_t k = 0; k < permutation.size(); ++k) {
-      const auto axis = static_cast<std::size_t>(
-          matrix.axis_of_row[static_cast<std::size_t>(permutation[k])]);
+      const auto axis =
+          static_cast<std::size_t>(matrix.axis_of_row[static_cast<std::size_t>(permutation[k])]);
       for (std::size_t c = 0; c < columns.size(); ++c)
         columns[c][axis] = x[k * width + c];
     }
