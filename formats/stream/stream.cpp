@@ -20,6 +20,7 @@
 #include <streambuf>
 #include <sys/file.h>
 #include <sys/stat.h>
+#include <sys/sysmacros.h>
 #include <unistd.h>
 #include <utility>
 #include <vector>
@@ -471,7 +472,8 @@ Output::Output(const std::string& path, const Options& options)
     throw Error(path, "is a directory, expected a file");
   if (!state.existed && errno != ENOENT)
     state.fail("cannot open for writing");
-  if (state.existed && !S_ISREG(info.st_mode) && options.beside)
+  const bool null = S_ISCHR(info.st_mode) && info.st_rdev == makedev(1, 3); // /dev/null
+  if (state.existed && !S_ISREG(info.st_mode) && options.beside && !null)
     throw Error(path, "is no regular file, expected one, or a new name, beside the result");
   if (state.existed && !S_ISREG(info.st_mode)) {
     if (options.binary && S_ISCHR(info.st_mode) && path.starts_with("/dev/tty"))

@@ -271,7 +271,7 @@ test_pipes_and_devices_are_no_files_beside_a_result() {
   for tool in $(programs); do
     sample "$tool"
     [[ $tool != ffe-precompute ]] || words+=(--columns all)
-    for side in fifo /dev/null; do
+    for side in fifo /dev/full; do
       expect_failure 1 "$tool" timeout 60 "${words[@]}" "--stats=$side" -o "$(target "$tool")"
       [[ ! -e $(target "$tool") ]] || fail "$tool left its result"
     done
@@ -283,6 +283,7 @@ test_pipes_and_devices_are_no_files_beside_a_result() {
       [[ -z $(ls -A out* .out* ./*.part 2>/dev/null) ]] || fail "$tool left files"
     done
   done
+  ffe-run in.scene --stats=/dev/null --record=/dev/null --events=/dev/null -o null.csv >answers || fail '/dev/null was refused'
   # Companions of a result.
   mkfifo run.xdmf mesh.node
   expect_refusal ffe-run run.xdmf timeout 60 ffe-run in.scene -o run.h5
