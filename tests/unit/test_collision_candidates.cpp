@@ -431,7 +431,7 @@ TEST(CandidateFilter, SelectsWhatMeasuringAllSelects) {
         double sides[2] = {0, 0};
         for (std::size_t k = 0; k < pair.size() && !steps.empty(); ++k) {
           double& side = sides[k < (edges ? 2U : 1U) ? 0 : 1];
-          side = std::max(side, steps[pair[k]]);
+          side = larger(side, steps[pair[k]]);
         }
         if (gap_at(surface, x, pair, edges) <= range + sides[0] + sides[1])
           to.push_back(pair);
