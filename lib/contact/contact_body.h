@@ -49,7 +49,7 @@ public:
   virtual double linearise(std::span<const VertexForce> forces, std::span<Vec3> step) = 0;
   /// Contact forces at the end of the last step, by ascending vertex.
   virtual std::vector<VertexForce> last_forces() const { return {}; }
-  /// Columns of these vertices are about to be asked for: what is solved together costs less.
+  /// Computes the columns that compliance() needs for these vertices: together they cost less.
   /// \pre linearised
   virtual void prepare(std::span<const std::uint32_t> /*vertices*/) {}
   /// Compliance between `vertex` and each vertex of `rows` in their frames:

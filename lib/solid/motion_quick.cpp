@@ -86,10 +86,8 @@ int MotionQuick::prepare(const MotionBody& body, const MotionSprings& springs,
   return 1;
 }
 
-bool MotionQuick::take_tangent(const MotionBody& body, const MotionSprings& springs,
+void MotionQuick::take_tangent(const MotionBody& body, const MotionSprings& springs,
                                const Numbers& at, const Context& context) {
-  if (!all_still_ || !body.elements.empty())
-    return false;
   const bool same_pattern = tangent_.factor && tangent_.held == held_;
   if (!same_pattern)
     tangent_.axes = solid_stiffness(body.mesh, body.elements, held_, context);
@@ -105,7 +103,6 @@ bool MotionQuick::take_tangent(const MotionBody& body, const MotionSprings& spri
   tangent_.taken = true;
   version_ = unique_number();
   forget();
-  return true;
 }
 
 void MotionQuick::drop_tangent() noexcept {

@@ -32,9 +32,9 @@ public:
   int prepare(const MotionBody& body, const MotionSprings& springs,
               const std::vector<std::uint8_t>& held, double h, const SolidMotionOptions& options,
               const Context& context);
-  /// In place of the bound of springs, their tangent at these places, until `step` or `held` change
-  /// or drop_tangent. \return whether it was taken: not where elements turn \pre prepared
-  bool take_tangent(const MotionBody& body, const MotionSprings& springs, const Numbers& at,
+  /// Takes the tangent of springs at these positions in place of their bound, until the step or
+  /// `held` change, or drop_tangent. \pre prepared, wants_tangent()
+  void take_tangent(const MotionBody& body, const MotionSprings& springs, const Numbers& at,
                     const Context& context);
   void drop_tangent() noexcept;
   bool has_tangent() const noexcept { return tangent_.taken; }

@@ -1,6 +1,7 @@
 #include "solid/motion_tangent_internal.h"
 
 #include "base/parallel.h"
+#include "base/unique_number.h"
 #include "solid/assembly_internal.h"
 #include "solid/hyperelastic.h"
 #include "solid/matrix3_internal.h"
@@ -128,6 +129,7 @@ void MotionTangent::make(const MotionObjective& objective, const Numbers& at,
     factor_.emplace(tangent_, context);
   renewed_ = false;
   made_ = true;
+  version_ = unique_number();
 }
 
 void MotionTangent::unit_responses(std::span<const std::size_t> axes,

@@ -7,6 +7,7 @@
 #include "solve/stiffness.h"
 
 #include <cstddef>
+#include <cstdint>
 #include <optional>
 #include <span>
 #include <vector>
@@ -18,6 +19,8 @@ public:
   /// Other axes are held.
   void renew() noexcept { renewed_ = true; }
   bool is_made() const noexcept { return made_; }
+  /// Number of the matrix (base/unique_number.h), a new one by each make().
+  std::uint64_t version() const noexcept { return version_; }
   /// Its factor, positive definite, where the last evaluation was, at `at`. \throw as Factor: then
   /// it isn't made
   void make(const MotionObjective& objective, const Numbers& at, const Context& context);
@@ -28,6 +31,7 @@ public:
 
 private:
   bool renewed_ = true, made_ = false;
+  std::uint64_t version_ = 0;
   StiffnessMatrix tangent_;
   std::optional<Factor> factor_;
 };

@@ -1,7 +1,6 @@
 #include "solid/solid_motion.h"
 
 #include "base/error.h"
-#include "base/unique_number.h"
 #include "solid/assembly_internal.h"
 #include "solid/motion_body_internal.h"
 #include "solid/motion_descent_internal.h"
@@ -88,7 +87,7 @@ struct SolidMotion::State {
     SolidStep counts{};
   };
   std::optional<Open> open;
-  std::uint64_t matrix_version = 0, tangent_version = 0; ///< of the last model, of `tangent`
+  std::uint64_t matrix_version = 0; ///< of the last model
   /// The tangent is that of the last step, where it has served to the end: the next one of
   /// `last_step` begins with it.
   bool keeps_tangent = false;
@@ -177,12 +176,11 @@ void SolidMotion::State::renew_matrix(const Context& context) {
   } else if (open->is_new) {
     tangent.make(open->objective, open->point.at, context);
     ++open->counts.factorisations;
-    tangent_version = unique_number();
     open->exact = true;
     open->was_kept = false;
   }
   if (open->exact) {
-    matrix_version = tangent_version;
+    matrix_version = tangent.version();
     return;
   }
   quick.turn(energy, context);

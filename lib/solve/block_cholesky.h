@@ -23,8 +23,7 @@ public:
   /// \pre matrix.size() == group.size()^2; groups are numbered below the root of coupled.size()
   bool factor(std::span<double> matrix, std::span<const std::uint32_t> group,
               std::span<const std::uint8_t> coupled, CpuLevel cpu);
-  std::size_t order() const noexcept { return order_; }
-  /// x = A^-1 x, in place. \pre factor() returned true, x.size() == order()
+  /// x = A^-1 x, in place. \pre factor() returned true, x.size() == group.size()
   void solve(std::span<double> x);
 
 private:

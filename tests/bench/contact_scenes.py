@@ -38,21 +38,24 @@ def ellipsoid(counts, axes, centre=(0, 0, 0)):
     return grid(counts, place)
 
 
+def grasp(s, steps, start, close, pull):
+    """Two instruments close along z by `close` in the first half of the steps, and go by `pull` along x in the second."""
+    s.emit("forces", "instruments")
+    for k in range(steps):
+        t = 2 * (k + 1) / steps
+        for name, side in (("lower", -1), ("upper", 1)):
+            at = (start[0] + pull * max(0, t - 1), start[1], side * (start[2] - close * min(1, t)))
+            s.line(f"move {name} {words_of(at)} over {1 / 60!r}")
+        s.line(f"step {1 / 60!r}")
+    return s, steps / 60
+
+
 def liver(folder, programs):
     s = Scene(folder, programs, 1, 1 / 60)
     s.solid("liver", ellipsoid((13, 13, 13), (70, 50, 35)), 5000, 0.45, fix="x<-60", words="damping=0.2@10")
     for name, z in (("lower", -40), ("upper", 40)):
         s.mesh_instrument(name, plate((24, 40, 4)), (40, 0, z), "friction 0.8")
-    s.emit("forces", "instruments")
-    steps = 60
-    for k in range(steps):
-        t = (k + 1) / steps
-        close, pull = min(1, 2 * t), max(0, 2 * t - 1)
-        for name, side in (("lower", -1), ("upper", 1)):
-            z = side * (40 - 10 * close)
-            s.line(f"move {name} {words_of((40 + 15 * pull, 0, z))} over {1 / 60!r}")
-        s.line(f"step {1 / 60!r}")
-    return s, steps / 60
+    return grasp(s, 60, (40, 0, 40), 10, 15)
 
 
 def gallbladder(folder, programs):
@@ -60,17 +63,7 @@ def gallbladder(folder, programs):
     s.solid("gallbladder", ellipsoid((8, 8, 4), (25, 12, 10)), 20000, 0.4, fix="x<-20", words="damping=0.2@10")
     for name, z in (("lower", -12.5), ("upper", 12.5)):
         s.line(f"instrument {name} capsule {words_of(2, (8, -8, z), (8, 8, z))} friction 0.6")
-    s.emit("forces", "instruments")
-    steps = 48
-    for k in range(steps):
-        t = (k + 1) / steps
-        close, pull = min(1, 2 * t), max(0, 2 * t - 1)
-        for name, side in (("lower", -1), ("upper", 1)):
-            z = side * (12.5 - 3 * close)
-            x = 8 + 12 * pull
-            s.line(f"move {name} {words_of((x, -8, z))} over {1 / 60!r}")
-        s.line(f"step {1 / 60!r}")
-    return s, steps / 60
+    return grasp(s, 48, (8, -8, 12.5), 3, 12)
 
 
 def net(folder, programs):

@@ -43,6 +43,19 @@ std::vector<Vec3> displaced(const std::vector<Vec3>& x, double by, unsigned seed
   return y;
 }
 
+/// v^T H v of a random v.
+double random_form(const HessianBlock& block, std::mt19937& random) {
+  const std::size_t n = 3 * std::size_t{block.count};
+  std::array<double, 12> v{};
+  for (double& c : v)
+    c = test::random_point(random, 1).x;
+  double form = 0;
+  for (std::size_t i = 0; i < n; ++i)
+    for (std::size_t j = 0; j < n; ++j)
+      form += v[i] * block.entry[i * n + j] * v[j];
+  return form;
+}
+
 TEST(Friction, SmoothFunctionAndItsDerivatives) {
   const double e = 0.3, h = 1e-6;
   const auto first = [&](double u) { return smooth_friction(u, e).first_over_u * u; };
@@ -97,14 +110,7 @@ TEST(Friction, GradientAndHessianAreThoseOfDifferences) {
       }
       std::mt19937 random(3);
       for (int k = 0; k < 5; ++k) {
-        double form = 0;
-        std::array<double, 12> v{};
-        for (double& c : v)
-          c = test::random_point(random, 1).x;
-        for (std::size_t i = 0; i < n; ++i)
-          for (std::size_t j = 0; j < n; ++j)
-            form += v[i] * blocks[0].entry[i * n + j] * v[j];
-        EXPECT_GE(form, -1e-12 * scale);
+        EXPECT_GE(random_form(blocks[0], random), -1e-12 * scale);
       }
     }
   }
@@ -130,14 +136,7 @@ TEST(Friction, PrimalDualHessianIsPositiveAndBecomesTheExactOne) {
         dual = dual - dot(dual, pair.normal) * pair.normal;
         pair.dual = dual / std::max(1.0, norm(dual));
         friction_hessian(one, x, start, e, HessianMode::gauss_newton, blocks);
-        double form = 0;
-        std::array<double, 12> v{};
-        for (double& c : v)
-          c = test::random_point(random, 1).x;
-        for (std::size_t i = 0; i < n; ++i)
-          for (std::size_t j = 0; j < n; ++j)
-            form += v[i] * blocks[0].entry[i * n + j] * v[j];
-        EXPECT_GE(form, -1e-12 * scale);
+        EXPECT_GE(random_form(blocks[0], random), -1e-12 * scale);
       }
       advance_duals(one, x, x, start, e, 1); // a step that moves nothing: the force itself
       friction_hessian(one, x, start, e, HessianMode::gauss_newton, blocks);
