@@ -19,16 +19,18 @@ INSTALL ?= install
 
 flags_release := -O2 -DNDEBUG
 flags_debug := -O0 -g
-# AddressSanitizer stops at null pointers and behind objects, too; the checks of UBSan left out would be a quarter of a build.
-flags_sanitize := -O1 -g1 -fsanitize=address,undefined -fno-sanitize=null,object-size,vptr -fno-sanitize-recover=all -fno-omit-frame-pointer -DGEWEBE_SANITIZE
+# AddressSanitizer stops at null pointers and behind objects, too; the checks of UBSan left out would be more than half of a
+# build. Eigen allocates as it does without AddressSanitizer, for tests' objects are shared.
+flags_sanitize := -O1 -g1 -fsanitize=address,undefined -fno-sanitize=null,object-size,vptr,pointer-overflow,alignment -fno-sanitize-recover=all -fno-omit-frame-pointer -DGEWEBE_SANITIZE \
+  -DEIGEN_MALLOC_ALREADY_ALIGNED=1
 flags_thread := -O1 -g1 -fsanitize=thread -DGEWEBE_SANITIZE
 flags_coverage := -O0 -g --coverage
 flags_fuzz := -O1 -g1 -fsanitize=address,fuzzer-no-link -fno-omit-frame-pointer -DGEWEBE_SANITIZE
-# The units of tests/unit are long and run for moments: most of a build would be their code. They are optimised less, and
-# the sanitizers watch the library and not the tests' own code (it is linked behind the library, so that functions of
-# headers are the library's; Eigen's must agree on who allocates, for it does so in another way under AddressSanitizer).
+# The units of tests/unit are long and run for moments: most of a build would be their code. They are optimised less and
+# compiled once for release and sanitize: the sanitizers watch the library and not the tests' own code (it is linked behind
+# the library, so that functions of headers are the library's).
 unit_flags_release := -O1 -DNDEBUG
-unit_flags_sanitize := -O1 -g1 -fno-omit-frame-pointer -DGEWEBE_SANITIZE -DEIGEN_MALLOC_ALREADY_ALIGNED=0
+unit_flags_sanitize := $(unit_flags_release)
 ifeq ($(flags_$(config)),)
 $(error config=$(config) is unknown, expected release, debug, sanitize, thread, coverage or fuzz)
 endif
@@ -43,6 +45,8 @@ LANGUAGE := -std=c++20 -ffp-contract=off -fPIC
 INCLUDES := -Ilib -I. $(addprefix -isystem /usr/include/,eigen3 suitesparse hdf5/serial)
 DEFINES := -DGEWEBE_VERSION='"$(VERSION)"'
 OPTIMIZE := $(flags_$(config))
+# Objects of tests/unit.
+UNIT_BUILD := $(if $(unit_flags_$(config)),build/tests,$(BUILD))
 ALLFLAGS = $(LANGUAGE) $(OPTIMIZE) $(WARNINGS) $(INCLUDES) $(DEFINES) $(CPPFLAGS) $(CXXFLAGS)
 # Where there is ccache, one machine compiles the same text with the same flags once; CCACHE= turns that off.
 CCACHE ?= $(shell command -v ccache)
@@ -100,12 +104,14 @@ SINGLE := %_avx2.cpp %_avx512.cpp %_baseline.cpp %_cgal.cpp lib/voxelize/coverag
 GROUPED := $(filter-out $(SINGLE) tools/shared/% lib/volume/% formats/volume/%,$(LIB_SRC) $(SHARED_SRC) $(UNIT_SRC))
 ifneq ($(UNITY),no)
 ifneq ($(filter-out clean deps help html lint uninstall,$(or $(MAKECMDGOALS),all)),)
-UNITS := $(shell scripts/unity '$(BUILD)/unity' 2000 $(GROUPED))
+UNITS := $(shell scripts/unity '$(BUILD)/unity' 2000 $(filter-out tests/%,$(GROUPED))) \
+  $(shell scripts/unity '$(UNIT_BUILD)/unity' 2000 $(filter tests/%,$(GROUPED)))
 endif
 endif
 # Objects of source files: of the groups that hold them, or their own.
-obj = $(patsubst %.cpp,$(BUILD)/obj/%.o,$(if $(UNITS),$(filter-out $(GROUPED),$(1)),$(1))) \
-  $(patsubst %,$(BUILD)/obj/%.o,$(filter $(addsuffix /%,$(sort $(patsubst %/,%,$(dir $(filter $(GROUPED),$(1)))))),$(UNITS)))
+obj = $(patsubst $(BUILD)/obj/tests/unit/%,$(UNIT_BUILD)/obj/tests/unit/%,\
+  $(patsubst %.cpp,$(BUILD)/obj/%.o,$(if $(UNITS),$(filter-out $(GROUPED),$(1)),$(1))) \
+  $(patsubst %,$(BUILD)/obj/%.o,$(filter $(addsuffix /%,$(sort $(patsubst %/,%,$(dir $(filter $(GROUPED),$(1)))))),$(UNITS))))
 # The commit that programs tell; its own unit, so that another one compiles nothing else and links programs alone.
 COMMIT := $(BUILD)/obj/commit.o
 OBJECTS := $(call obj,$(LIB_SRC) $(SHARED_SRC) $(TOOL_SRC) $(UNIT_SRC) $(STRESS_SRC) $(FUZZ_SRC) $(BENCH_SRC) $(VALIDATE_SRC) tests/fuzz/replay.cpp)
@@ -153,12 +159,21 @@ $(BUILD)/obj/lib/raster/raster_kernel_%.o: FILE_FLAGS += -Wno-psabi
 $(BUILD)/obj/lib/raster/raster_kernel_baseline.o: FILE_FLAGS := -Wno-psabi $(kernel)
 # CGAL's interval arithmetic changes the rounding mode. More than -O1 takes twice as long to compile.
 $(BUILD)/obj/%_cgal.o: FILE_FLAGS := -frounding-math $(if $(filter release,$(config)),-O1)
+$(UNIT_BUILD)/obj/tests/unit/%_cgal.o: FILE_FLAGS := -frounding-math
+# Instances for five types of voxels.
+$(UNIT_BUILD)/obj/tests/unit/test_volume_file_openvdb.o: FILE_FLAGS := -O0
 
-# Holds the command, so that other flags compile everything again.
-COMMAND := $(CXX) $(ALLFLAGS) $(unit_flags_$(config)) $(LDFLAGS)
+# Hold the commands, so that other flags compile everything again.
+COMMAND := $(CXX) $(ALLFLAGS) $(LDFLAGS)
 $(BUILD)/flags: FORCE | $(FIRST)
 	@mkdir -p $(@D)
 	@printf '%s\n' '$(subst ','\'',$(COMMAND))' | cmp -s - $@ || printf '%s\n' '$(subst ','\'',$(COMMAND))' > $@
+ifneq ($(UNIT_BUILD),$(BUILD))
+$(UNIT_BUILD)/flags: OPTIMIZE := $(unit_flags_$(config))
+$(UNIT_BUILD)/flags: FORCE | $(FIRST)
+	@mkdir -p $(@D)
+	@printf '%s\n' '$(subst ','\'',$(CXX) $(ALLFLAGS))' | cmp -s - $@ || printf '%s\n' '$(subst ','\'',$(CXX) $(ALLFLAGS))' > $@
+endif
 
 # Headers of the language that most units read (of 3 s for a unit, 2 s were spent in them), compiled once for each kind
 # of unit; what a unit includes it still says itself, as `make lint` sees, which does without. Units with flags of their
@@ -168,36 +183,47 @@ PRECOMPILED_lib := algorithm array bit charconv cmath cstddef cstdint cstring fu
   optional span string string_view tuple utility variant vector
 PRECOMPILED_unit := $(PRECOMPILED_lib) filesystem fstream iostream numbers random set sstream gtest/gtest.h
 # g++ 12 forgets that precompiled headers are the system's and shows its false alarms within std::string.
-precompiled = $(if $(FILE_FLAGS),,-include $(BUILD)/precompiled/$(KIND).h \
+precompiled = $(if $(FILE_FLAGS),,-include $(PRECOMPILED)/$(KIND).h \
   $(addprefix -Wno-,array-bounds restrict stringop-overflow stringop-overread))
 endif
 KIND := lib
+PRECOMPILED := $(BUILD)/precompiled
+$(UNIT_BUILD)/obj/tests/unit/%.o: KIND := unit
+$(UNIT_BUILD)/obj/tests/unit/%.o: PRECOMPILED := $(UNIT_BUILD)/precompiled
 ifneq ($(unit_flags_$(config)),)
-$(BUILD)/obj/tests/unit/%.o $(BUILD)/precompiled/unit.h.gch: OPTIMIZE := $(unit_flags_$(config))
+$(UNIT_BUILD)/obj/tests/unit/%.o $(UNIT_BUILD)/precompiled/unit.h.gch: OPTIMIZE := $(unit_flags_$(config))
 endif
-$(BUILD)/obj/tests/unit/%.o: KIND := unit
 
 # A class of one .cpp may have members of its anonymous namespace; within a unity unit g++ takes the .cpp for a header.
 UNITY_FLAGS := $(if $(filter g++%,$(notdir $(firstword $(CXX)))),-Wno-subobject-linkage)
 
-$(BUILD)/precompiled/%.h: Makefile
-	@mkdir -p $(@D)
-	@printf '#include <%s>\n' $(PRECOMPILED_$*) > $@.new && { cmp -s $@.new $@ && rm $@.new || mv $@.new $@; }
-$(BUILD)/precompiled/%.h.gch: $(BUILD)/precompiled/%.h $(BUILD)/flags | $(FIRST)
+define precompiled_header
+@mkdir -p $(@D)
+@printf '#include <%s>\n' $(PRECOMPILED_$*) > $@.new && { cmp -s $@.new $@ && rm $@.new || mv $@.new $@; }
+endef
+$(BUILD)/precompiled/lib.h: $(BUILD)/precompiled/%.h: Makefile
+	$(precompiled_header)
+$(UNIT_BUILD)/precompiled/unit.h: $(UNIT_BUILD)/precompiled/%.h: Makefile
+	$(precompiled_header)
+$(BUILD)/precompiled/lib.h.gch: $(BUILD)/flags
+$(UNIT_BUILD)/precompiled/unit.h.gch: $(UNIT_BUILD)/flags
+build/%.h.gch: build/%.h | $(FIRST)
 	$(CCACHE) $(CXX) $(ALLFLAGS) -x c++-header $< -o $@
-.PRECIOUS: $(BUILD)/precompiled/%.h $(BUILD)/precompiled/%.h.gch
+.PRECIOUS: $(BUILD)/precompiled/lib.h $(UNIT_BUILD)/precompiled/unit.h build/%.h.gch
 
-$(BUILD)/obj/tests/unit/%.o: $(BUILD)/unity/tests/unit/%.cpp $(BUILD)/flags $(if $(PRECOMPILED_lib),$(BUILD)/precompiled/unit.h.gch) | $(FIRST)
+lib_first := $(BUILD)/flags $(if $(PRECOMPILED_lib),$(BUILD)/precompiled/lib.h.gch)
+unit_first := $(UNIT_BUILD)/flags $(if $(PRECOMPILED_lib),$(UNIT_BUILD)/precompiled/unit.h.gch)
+$(UNIT_BUILD)/obj/tests/unit/%.o: $(UNIT_BUILD)/unity/tests/unit/%.cpp $(unit_first) | $(FIRST)
 	$(compile)
-$(BUILD)/obj/%.o: $(BUILD)/unity/%.cpp $(BUILD)/flags $(if $(PRECOMPILED_lib),$(BUILD)/precompiled/lib.h.gch) | $(FIRST)
+$(BUILD)/obj/%.o: $(BUILD)/unity/%.cpp $(lib_first) | $(FIRST)
 	$(compile)
-$(BUILD)/obj/tests/unit/%.o: tests/unit/%.cpp $(BUILD)/flags $(if $(PRECOMPILED_lib),$(BUILD)/precompiled/unit.h.gch) | $(FIRST)
+$(UNIT_BUILD)/obj/tests/unit/%.o: tests/unit/%.cpp $(unit_first) | $(FIRST)
 	$(compile)
-$(BUILD)/obj/%.o: %.cpp $(BUILD)/flags $(if $(PRECOMPILED_lib),$(BUILD)/precompiled/lib.h.gch) | $(FIRST)
+$(BUILD)/obj/%.o: %.cpp $(lib_first) | $(FIRST)
 	$(compile)
 define compile
 @mkdir -p $(@D)
-$(CCACHE) $(CXX) $(ALLFLAGS) $(FILE_FLAGS) $(precompiled) $(if $(filter $(BUILD)/unity/%,$<),$(UNITY_FLAGS)) -MMD -MP -c $< -o $@
+$(CCACHE) $(CXX) $(ALLFLAGS) $(FILE_FLAGS) $(precompiled) $(if $(filter $(BUILD)/unity/% $(UNIT_BUILD)/unity/%,$<),$(UNITY_FLAGS)) -MMD -MP -c $< -o $@
 endef
 
 $(ARCHIVE): $(call obj,$(LIB_SRC))
@@ -324,16 +350,29 @@ wheel: $(TOOLS) $(PLUGIN) | $(FIRST)
 LINT := build/lint
 LINT_CXX := $(wildcard lib/*/*.cpp formats/*/*.cpp tools/*.cpp tools/*/*.cpp tests/*/*.cpp)
 LINT_HEADERS := $(wildcard lib/*/*.h formats/*/*.h tools/*/*.h tests/*/*.h)
-FORMAT_STAMPS := $(patsubst %,$(LINT)/%.format,$(LINT_CXX) $(LINT_HEADERS))
-TIDY_STAMPS := $(LINT_CXX:%=$(LINT)/%.tidy)
+# clang-tidy reads groups of files, as the compiler does: most of its time goes to headers. TIDY='lib tools' looks at these
+# folders alone, COMMITS=40 at what the last 40 commits changed (a header with the .cpp beside it).
+TIDY ?= lib formats tools tests
+TIDY_CXX := $(filter $(TIDY:%=%/%),$(LINT_CXX))
+ifneq ($(COMMITS),)
+TIDY_CXX := $(filter $(patsubst %.h,%.cpp,$(shell git log -n $(COMMITS) --no-merges -M --diff-filter=AM --name-only --format= || \
+  printf '%s\n' $(LINT_CXX))),$(TIDY_CXX))
+endif
+TIDY_ALONE := $(filter $(SINGLE) lib/volume/% formats/volume/% tools/shared/% $(wildcard tools/*.cpp) \
+  $(patsubst %,tests/%/%,bench fuzz stress validate),$(TIDY_CXX))
+ifneq ($(filter lint,$(MAKECMDGOALS)),)
+TIDY_UNITS := $(shell scripts/unity '$(LINT)/unity' 8000 $(filter-out $(TIDY_ALONE),$(TIDY_CXX)))
+endif
+TIDY_STAMPS := $(TIDY_ALONE:%=$(LINT)/%.tidy) $(TIDY_UNITS:%=$(LINT)/unity/%.tidy)
 MAN_STAMPS := $(MAN:%=$(LINT)/%.mandoc)
 SHELL_STAMPS := $(SCRIPTS:%=$(LINT)/%.shellcheck)
-INCLUDE_STAMPS := $(patsubst %,$(LINT)/%.includes,$(LINT_CXX) $(LINT_HEADERS))
 
+FORMAT_STAMP := $(LINT)/format
+INCLUDES_STAMP := $(LINT)/includes
 NAMES_STAMP := $(LINT)/names
 WORDS_STAMP := $(LINT)/words
 
-lint: $(FORMAT_STAMPS) $(INCLUDE_STAMPS) $(NAMES_STAMP) $(WORDS_STAMP) $(MAN_STAMPS) $(SHELL_STAMPS) $(TIDY_STAMPS)
+lint: $(FORMAT_STAMP) $(INCLUDES_STAMP) $(NAMES_STAMP) $(WORDS_STAMP) $(MAN_STAMPS) $(SHELL_STAMPS) $(TIDY_STAMPS)
 
 $(NAMES_STAMP): $(LINT_CXX) $(LINT_HEADERS) scripts/check-names | $(FIRST)
 	@mkdir -p $(@D)
@@ -346,14 +385,16 @@ $(WORDS_STAMP): $(filter lib/% formats/% tools/%,$(LINT_CXX) $(LINT_HEADERS)) $(
 	@mkdir -p $(@D)
 	@scripts/check-words && touch $@
 
-$(FORMAT_STAMPS): $(LINT)/%.format: % .clang-format | $(FIRST)
+# Of those that changed.
+$(FORMAT_STAMP): $(LINT_CXX) $(LINT_HEADERS) | $(FIRST)
 	@mkdir -p $(@D)
-	@echo 'clang-format $<'
-	@clang-format-16 --dry-run -Werror $< && touch $@
+	@echo 'clang-format'
+	@clang-format-16 --dry-run -Werror $? && touch $@
 
-$(INCLUDE_STAMPS): $(LINT)/%.includes: % scripts/check-includes scripts/check-nan lib/PUBLIC | $(FIRST)
+$(INCLUDES_STAMP): $(LINT_CXX) $(LINT_HEADERS) scripts/check-includes scripts/check-nan lib/PUBLIC | $(FIRST)
 	@mkdir -p $(@D)
-	@scripts/check-includes $< && scripts/check-nan $< && touch $@
+	@echo 'check-includes, check-nan'
+	@scripts/check-includes $(LINT_CXX) $(LINT_HEADERS) && scripts/check-nan $(LINT_CXX) $(LINT_HEADERS) && touch $@
 
 $(MAN_STAMPS): $(LINT)/%.mandoc: % | $(FIRST)
 	@mkdir -p $(@D)
@@ -365,12 +406,14 @@ $(SHELL_STAMPS): $(LINT)/%.shellcheck: % | $(FIRST)
 	@echo 'shellcheck $<'
 	@shellcheck -x $< && touch $@
 
-# Writes beside the stamp which of our headers the file reads, so that their change counts too. (What passed in another
-# clone with the same text is known to scripts/tidy.)
+# Writes beside the stamp which of our files the file reads, so that their change counts too. (What passed in another
+# clone with the same text is known to scripts/tidy.) `make build/lint/lib/base/text.cpp.tidy` looks at one file.
 TIDY_FLAGS = $(LANGUAGE) $(WARNINGS) $(INCLUDES) $(DEFINES) $(CPPFLAGS) $(FILE_FLAGS)
 $(LINT)/%_avx2.cpp.tidy: FILE_FLAGS := -mavx2 -mfma
 $(LINT)/%_avx512.cpp.tidy: FILE_FLAGS := -mavx512f -mavx512dq -mavx512bw -mavx512vl -mfma
-$(TIDY_STAMPS): $(LINT)/%.tidy: % .clang-tidy tests/.clang-tidy scripts/tidy | $(FIRST)
+$(LINT)/unity/%.tidy: $(LINT)/unity/%.cpp .clang-tidy scripts/tidy | $(FIRST)
+	@scripts/tidy $< $@.d $(TIDY_FLAGS) && touch $@
+$(LINT)/%.tidy: % .clang-tidy scripts/tidy | $(FIRST)
 	@mkdir -p $(@D)
 	@scripts/tidy $< $@.d $(TIDY_FLAGS) && touch $@
 -include $(TIDY_STAMPS:=.d)

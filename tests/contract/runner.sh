@@ -71,11 +71,11 @@ test_answers_that_depend_on_threads_or_processor_fail() {
   must_fail 'with -j2' 'c | 1 | x: * | echo "x: $J" >&2; exit 1'
   must_fail 'GLIBC_TUNABLES' 'd | 0 | text | echo "${GLIBC_TUNABLES-none}"' none
   must_fail 'GEWEBE_CPU=baseline' 'e | 0 | text | test "${GEWEBE_CPU-}" = baseline && echo yes || echo no' no
-  must_fail 'GEWEBE_CPU=avx2' 'f | 0 | text | test "${GEWEBE_CPU-}" = avx2 && echo yes || echo no' no
-  must_fail 'GEWEBE_CPU=avx512' 'g | 0 | text | test "${GEWEBE_CPU-}" = avx512 && echo yes || echo no' no
   must_fail 'OPENBLAS_CORETYPE=Prescott' 'i | 0 | text | test "${OPENBLAS_CORETYPE-}" = Prescott && echo yes || echo no' no
-  ! grep -q ' avx2 ' /proc/cpuinfo ||
+  ! grep -q ' avx512vl ' /proc/cpuinfo || {
+    must_fail 'GEWEBE_CPU=avx2' 'f | 0 | text | test "${GEWEBE_CPU-}" = avx2 && echo yes || echo no' no
     must_fail 'OPENBLAS_CORETYPE=Haswell' 'j | 0 | text | test "${OPENBLAS_CORETYPE-}" = Haswell && echo yes || echo no' no
+  }
   must_fail 'with' 'h | 0 | text | test "${GEWEBE_CPU-}" && echo 1 > out || echo 2 > out; echo hello' hello
 }
 
@@ -151,9 +151,11 @@ test_two_runs_wait_for_each_other() {
 test_lists_of_the_sanitizers_name_tests() {
   local list pattern
   [[ -x $BUILD/unit ]] || skip "$BUILD/unit is not built"
+  "$BUILD/unit" --gtest_list_tests | awk '/^[^ ]/ { suite = $1; next } /^ / { print suite $1 }' >names
   for list in slow threads; do
     while read -r pattern; do
-      "$BUILD/unit" --gtest_list_tests --gtest_filter="$pattern" | grep -q '^ ' || fail "tests/sanitize/$list: no test is $pattern"
+      pattern=${pattern//./\\.}
+      grep -q "^${pattern//\*/.*}\$" names || fail "tests/sanitize/$list: no test is $pattern"
     done < <(sed 's/ *#.*//; /^$/d' "$GEWEBE_ROOT/tests/sanitize/$list")
   done
 }

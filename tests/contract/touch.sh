@@ -11,7 +11,7 @@ test_random_instruments_push_no_further_than_they_touch() {
   else
     left_out "no $folder: made models in place of organs"
   fi
-  python3 "$GEWEBE_ROOT/tests/validate/instruments.py" --count 24 --keep . "${data[@]}" >table.txt ||
+  python3 "$GEWEBE_ROOT/tests/validate/instruments.py" --count 12 --keep . "${data[@]}" >table.txt ||
     fail 'an instrument pulls, is in the surface, leaves the cone, or pushes where it does not touch' "$(<table.txt)"
   [[ $(grep -cE '^(liver|spleen|colon), ' table.txt) == 9 ]] || fail 'expected nine bodies' "$(<table.txt)"
 }

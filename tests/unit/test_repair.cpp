@@ -4,6 +4,7 @@
 #include "mesh/check.h"
 #include "mesh/weld.h"
 #include "mesh_fixtures.h"
+#include "tests/unit/sanitizers.h"
 
 #include <gtest/gtest.h>
 
@@ -399,9 +400,8 @@ TEST(Repair, UnderstandsWordsAndRefusesOthers) {
 }
 
 TEST(Repair, OfDirtyOrgans) {
-#ifdef GEWEBE_SANITIZE
-  GTEST_SKIP() << "takes 40 s with sanitizers";
-#endif
+  if (test::under_sanitizers())
+    GTEST_SKIP() << "takes 40 s with sanitizers";
   for (const char* const name : {"hubmap_M_liver_dirty.obj", "hubmap_female_reproductive.obj"}) {
     TriangleMesh mesh = test::load_test_mesh(name);
     if (mesh.triangles.empty())

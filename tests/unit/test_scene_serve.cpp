@@ -7,6 +7,7 @@
 #include "fuzzed_scenes.h"
 #include "scratch.h"
 #include "sim_models.h"
+#include "tests/unit/sanitizers.h"
 #include "tools/run/event_log.h"
 #include "tools/run/run_report.h"
 #include "tools/run/scene_lines.h"
@@ -290,11 +291,8 @@ TEST(SceneServe, ALineWithoutEndIsRefusedAtOnce) {
 TEST(SceneServe, AnyScenePlaysAgainToTheLastByte) {
   // The time that a scene may take is the processor's: sanitizers take some ten times as much, so
   // that more scenes are ended early there. These seeds have few that take long.
-#ifdef GEWEBE_SANITIZE
-  constexpr std::uint64_t first = 82, scenes = 60, may_be_slow = 20;
-#else
-  constexpr std::uint64_t first = 63, scenes = 99, may_be_slow = 4;
-#endif
+  const bool slow = test::under_sanitizers();
+  const std::uint64_t first = slow ? 82 : 63, scenes = slow ? 15 : 50, may_be_slow = slow ? 5 : 3;
   test::FuzzedCounts seen;
   for (std::uint64_t seed = first; seed < first + scenes; ++seed)
     EXPECT_EQ(test::fault_of_scene(test::FuzzedScene(seed).lines(), seen), "")
@@ -399,7 +397,7 @@ std::string forces_in(const std::string& replies) {
 
 // What is measured and how exactly shapes are shown has no effect on how a scene goes on.
 TEST(SceneServe, WhatIsMeasuredAndShownChangesNothing) {
-  const std::uint64_t scenes = 40;
+  const std::uint64_t scenes = 20; // make stress looks at thousands
   for (std::uint64_t seed = 1; seed <= scenes; ++seed) {
     std::vector<std::string> lines = test::FuzzedScene(seed).lines();
     lines.insert(lines.begin(), {"emit forces", "emit instruments"});

@@ -1,6 +1,7 @@
 // The meshes of marching cubes and snapping, judged by CGAL.
 
 #include "tests/unit/cgal_surface.h"
+#include "tests/unit/sanitizers.h"
 #include "tests/unit/surface_scenes.h"
 #include "tests/unit/surface_stress.h"
 
@@ -24,11 +25,7 @@ bool faces_outward(const TriangleMesh& mesh) {
 
 TEST(SnappingCgal, RandomScenesKeepTheirTopology) {
   // make stress looks at thousands; naive snapping is caught by each third (below).
-#ifdef GEWEBE_SANITIZE
-  constexpr std::size_t count = 12;
-#else
-  constexpr std::size_t count = 60;
-#endif
+  const std::size_t count = test::under_sanitizers() ? 12 : 60;
   std::vector<std::string> complaints(count);
   parallel_blocks({}, count, 1, [&](std::size_t n, std::size_t) {
     complaints[n] = stress_complaint(stress_scene(static_cast<std::uint32_t>(n)));

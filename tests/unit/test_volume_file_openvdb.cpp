@@ -4,6 +4,7 @@
 #include "mesh/check.h"
 #include "surface/marching_cubes.h"
 #include "tests/unit/complaint.h"
+#include "tests/unit/sanitizers.h"
 
 #include <gtest/gtest.h>
 #include <openvdb/io/Stream.h>
@@ -138,8 +139,9 @@ TEST(VolumeFileOpenvdb, LengthsBeyondTheStreamAreRefused) {
     }
 }
 
-#ifndef GEWEBE_SANITIZE // OpenVDB's reader of other types leaks the tree when it throws
 TEST(VolumeFileOpenvdb, TruncatedStreamsOfSeveralGridsAreRefused) {
+  if (test::under_sanitizers())
+    GTEST_SKIP() << "OpenVDB's reader of other types leaks the tree when it throws";
   for (const bool packed : {true, false}) {
     const std::string whole = stream_of(
         {cube<openvdb::Vec3SGrid>("velocity", {1, 2, 3}), cube<openvdb::FloatGrid>("density", 1)},
@@ -152,7 +154,6 @@ TEST(VolumeFileOpenvdb, TruncatedStreamsOfSeveralGridsAreRefused) {
     EXPECT_NE(complaint(whole.substr(0, whole.size() - 1)), "");
   }
 }
-#endif
 
 } // namespace
 } // namespace gewebe
