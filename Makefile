@@ -100,8 +100,8 @@ PLUGINDIR = $(patsubst %/,%,$(dir $(BINDIR)))/lib/gewebe
 # each file by itself; a build folder that has such objects goes on with them unless UNITY=yes is given.
 # Files with flags of their own are in no group, nor those that would bring libraries to programs that need others of them.
 UNITY ?= $(if $(filter-out $(BUILD)/obj/lib/base/lib-base-%,$(wildcard $(BUILD)/obj/lib/base/*.o)),no,yes)
-SINGLE := %_avx2.cpp %_avx512.cpp %_baseline.cpp %_cgal.cpp lib/voxelize/coverage_exact.cpp tests/unit/mesh_fixtures.cpp
-GROUPED := $(filter-out $(SINGLE) tools/shared/% lib/volume/% formats/volume/%,$(LIB_SRC) $(SHARED_SRC) $(UNIT_SRC))
+SINGLE := %_avx2.cpp %_avx512.cpp %_baseline.cpp %_cgal.cpp lib/antialiasing/coverage_exact.cpp tests/unit/mesh_fixtures.cpp
+GROUPED := $(filter-out $(SINGLE) tools/cli/% tools/model/% tools/volume/% lib/volume/% formats/volume/%,$(LIB_SRC) $(SHARED_SRC) $(UNIT_SRC))
 ifneq ($(UNITY),no)
 ifneq ($(filter-out clean deps help html lint uninstall,$(or $(MAKECMDGOALS),all)),)
 UNITS := $(shell scripts/unity '$(BUILD)/unity' 2000 $(filter-out tests/%,$(GROUPED))) \
@@ -153,7 +153,7 @@ deps:
 kernel = $(if $(filter release,$(config)),-O3) -fno-math-errno -fno-trapping-math
 $(BUILD)/obj/%_avx2.o: FILE_FLAGS := -mavx2 -mfma $(kernel)
 $(BUILD)/obj/%_avx512.o: FILE_FLAGS := -mavx512f -mavx512dq -mavx512bw -mavx512vl -mfma $(kernel)
-$(BUILD)/obj/lib/voxelize/coverage_exact.o: FILE_FLAGS := $(kernel)
+$(BUILD)/obj/lib/antialiasing/coverage_exact.o: FILE_FLAGS := $(kernel)
 # Eight lanes on four, or on two: their vectors cross no call that is not inlined.
 $(BUILD)/obj/lib/raster/raster_kernel_%.o: FILE_FLAGS += -Wno-psabi
 $(BUILD)/obj/lib/raster/raster_kernel_baseline.o: FILE_FLAGS := -Wno-psabi $(kernel)
@@ -358,7 +358,7 @@ ifneq ($(COMMITS),)
 TIDY_CXX := $(filter $(patsubst %.h,%.cpp,$(shell git log -n $(COMMITS) --no-merges -M --diff-filter=AM --name-only --format= || \
   printf '%s\n' $(LINT_CXX))),$(TIDY_CXX))
 endif
-TIDY_ALONE := $(filter $(SINGLE) lib/volume/% formats/volume/% tools/shared/% $(wildcard tools/*.cpp) \
+TIDY_ALONE := $(filter $(SINGLE) lib/volume/% formats/volume/% $(filter-out tools/run/%,$(wildcard tools/*/*.cpp)) $(wildcard tools/*.cpp) \
   $(patsubst %,tests/%/%,bench fuzz stress validate),$(TIDY_CXX))
 ifneq ($(filter lint,$(MAKECMDGOALS)),)
 TIDY_UNITS := $(shell scripts/unity '$(LINT)/unity' 8000 $(filter-out $(TIDY_ALONE),$(TIDY_CXX)))

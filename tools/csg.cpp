@@ -2,10 +2,10 @@
 
 #include "volume/csg.h"
 #include "formats/volume/volume_file.h"
-#include "tools/shared/cli.h"
-#include "tools/shared/report.h"
-#include "tools/shared/space_option.h"
-#include "tools/shared/volume_output.h"
+#include "tools/cli/cli.h"
+#include "tools/cli/report.h"
+#include "tools/cli/space_option.h"
+#include "tools/volume/volume_output.h"
 
 using namespace gewebe;
 

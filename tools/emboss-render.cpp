@@ -3,6 +3,7 @@
 #include "base/digest.h"
 #include "formats/image/image_file.h"
 #include "shading/occlusion.h"
+#include "tools/cli/cli.h"
 #include "tools/render/render_arguments.h"
 #include "tools/render/render_field.h"
 #include "tools/render/render_materials.h"
@@ -10,7 +11,6 @@
 #include "tools/render/render_volume.h"
 #include "tools/render/solid_surface.h"
 #include "tools/render/surface_file.h"
-#include "tools/shared/cli.h"
 
 #include <algorithm>
 #include <cstdlib>

@@ -5,13 +5,13 @@
 #include "formats/tetrahedra/tet_file.h"
 #include "model/build.h"
 #include "model/figures.h"
-#include "tools/shared/cli.h"
-#include "tools/shared/model_arguments.h"
-#include "tools/shared/model_fit.h"
-#include "tools/shared/model_source.h"
-#include "tools/shared/net_source.h"
-#include "tools/shared/space_option.h"
-#include "tools/shared/transform_option.h"
+#include "tools/cli/cli.h"
+#include "tools/cli/space_option.h"
+#include "tools/cli/transform_option.h"
+#include "tools/model/model_arguments.h"
+#include "tools/model/model_fit.h"
+#include "tools/model/model_source.h"
+#include "tools/model/net_source.h"
 
 #include <algorithm>
 #include <optional>

@@ -3,18 +3,18 @@
 #include "formats/results/partial_result.h"
 #include "formats/results/shared_shapes.h"
 #include "formats/stream/removal.h"
+#include "tools/cli/cli.h"
+#include "tools/cli/distrust.h"
+#include "tools/cli/progress_bar.h"
 #include "tools/run/event_log.h"
 #include "tools/run/failed_run.h"
 #include "tools/run/run_arguments.h"
 #include "tools/run/run_report.h"
-#include "tools/run/scene_answers.h"
 #include "tools/run/scene_progress.h"
 #include "tools/run/scene_record.h"
 #include "tools/run/scene_run.h"
 #include "tools/run/step_latency.h"
-#include "tools/shared/cli.h"
-#include "tools/shared/distrust.h"
-#include "tools/shared/progress_bar.h"
+#include "tools/serve/scene_answers.h"
 
 #include <cstdint>
 #include <memory>

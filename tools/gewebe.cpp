@@ -1,11 +1,11 @@
 // gewebe: starts the programs beside it, gewebe(1).
 
 #include "base/error.h"
-#include "base/nearest_word.h"
 #include "formats/stream/stream.h"
-#include "tools/shared/messages.h"
-#include "tools/shared/tool_list.h"
-#include "tools/shared/version.h"
+#include "text/nearest_word.h"
+#include "tools/cli/messages.h"
+#include "tools/cli/tool_list.h"
+#include "tools/cli/version.h"
 
 #include <algorithm>
 #include <cerrno>

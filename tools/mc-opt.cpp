@@ -1,10 +1,10 @@
 // mc-opt: volume -> triangle mesh of its isosurface, or tetrahedra of what lies inside.
 
 #include "stuffing/stuffing.h"
+#include "tools/cli/cli.h"
+#include "tools/cli/space_option.h"
 #include "tools/mesh/mesh_arguments.h"
 #include "tools/mesh/mesh_work.h"
-#include "tools/shared/cli.h"
-#include "tools/shared/space_option.h"
 
 using namespace gewebe;
 

@@ -4,9 +4,9 @@
 #include "density/density.h"
 #include "formats/mesh/particles_file.h"
 #include "formats/volume/volume_file.h"
-#include "tools/shared/cli.h"
-#include "tools/shared/report.h"
-#include "tools/shared/volume_output.h"
+#include "tools/cli/cli.h"
+#include "tools/cli/report.h"
+#include "tools/volume/volume_output.h"
 #include "volume/lattice.h"
 
 #include <array>

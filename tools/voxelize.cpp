@@ -1,13 +1,13 @@
 // voxelize: closed mesh, labels or scan -> volume.
 
 #include "formats/mesh/mesh_file.h"
-#include "tools/shared/cli.h"
-#include "tools/shared/filling_rule.h"
-#include "tools/shared/space_option.h"
-#include "tools/shared/transform_option.h"
-#include "tools/shared/voxelize_labels.h"
-#include "tools/shared/voxelize_mesh.h"
-#include "tools/shared/voxelize_scan.h"
+#include "tools/cli/cli.h"
+#include "tools/cli/filling_rule.h"
+#include "tools/cli/space_option.h"
+#include "tools/cli/transform_option.h"
+#include "tools/volume/voxelize_labels.h"
+#include "tools/volume/voxelize_mesh.h"
+#include "tools/volume/voxelize_scan.h"
 
 using namespace gewebe;
 

@@ -4,7 +4,7 @@
 #include "base/context.h"
 #include "formats/stream/kind.h"
 #include "formats/stream/stream.h"
-#include "shading/image.h"
+#include "texture/image.h"
 
 #include <string>
 #include <vector>

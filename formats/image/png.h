@@ -1,7 +1,7 @@
 #pragma once
 // PNG, by libpng.
 
-#include "shading/image.h"
+#include "texture/image.h"
 
 #include <string>
 #include <string_view>

@@ -1,7 +1,7 @@
 #pragma once
 // Portable anymaps: read as text or binary, gray or colour (P2, P3, P5, P6); written as P6.
 
-#include "shading/image.h"
+#include "texture/image.h"
 
 #include <string>
 #include <string_view>

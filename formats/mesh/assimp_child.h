@@ -3,8 +3,8 @@
 // Collada. assimp holds single precision. It runs in a child process with limits on memory and
 // time, for broken files crash it; only the importer of the requested kind is registered.
 
-#include "base/mesh.h"
 #include "formats/stream/kind.h"
+#include "geometry/mesh.h"
 
 #include <cstdint>
 #include <string>

@@ -1,10 +1,10 @@
 #pragma once
 // Meshes from and to any format we know, in millimetres; gewebe_mesh(5).
 
-#include "base/mesh.h"
 #include "formats/stream/kind.h"
 #include "formats/stream/stream.h"
-#include "mesh/weld.h"
+#include "geometry/mesh.h"
+#include "repair/weld.h"
 
 #include <cstdint>
 #include <optional>

@@ -2,7 +2,7 @@
 // Writers of OBJ and binary STL. Our own, for assimp's OBJ has single precision and its STL a fixed
 // name.
 
-#include "base/mesh.h"
+#include "geometry/mesh.h"
 
 #include <functional>
 #include <string_view>

@@ -1,7 +1,7 @@
 #include "formats/mesh/particles_file.h"
 
 #include "base/error.h"
-#include "base/number_text.h"
+#include "text/number_text.h"
 
 #include <array>
 #include <charconv>

@@ -1,7 +1,7 @@
 #pragma once
 // Particles as text (gewebe_particles(5)): one per line, `x y z R [weight]`, # comments.
 
-#include "base/particles.h"
+#include "geometry/particles.h"
 
 #include <string>
 #include <string_view>

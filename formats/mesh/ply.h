@@ -7,7 +7,7 @@
 // both binary orders, the properties above as any scalar type, the name vertex_index too, polygons
 // (cut into triangles), other elements and properties (skipped by their type).
 
-#include "base/mesh.h"
+#include "geometry/mesh.h"
 
 #include <cstdint>
 #include <functional>

@@ -1,8 +1,8 @@
 #include "base/error.h"
-#include "base/number_text.h"
 #include "formats/mesh/ply.h"
 #include "formats/mesh/ply_source.h"
 #include "mesh/triangulate.h"
+#include "text/number_text.h"
 
 #include <algorithm>
 #include <cmath>

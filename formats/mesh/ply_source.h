@@ -2,8 +2,8 @@
 // Where the numbers of a PLY body come from.
 
 #include "base/error.h"
-#include "base/number_text.h"
 #include "formats/mesh/ply_header.h"
+#include "text/number_text.h"
 
 #include <algorithm>
 #include <array>

@@ -1,8 +1,8 @@
 #include "formats/mesh/text_words.h"
 
 #include "base/error.h"
-#include "base/number_text.h"
 #include "formats/mesh/ply_header.h"
+#include "text/number_text.h"
 
 #include <algorithm>
 #include <charconv>

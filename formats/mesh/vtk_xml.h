@@ -2,8 +2,8 @@
 // Files of VTK in XML with one piece: .vtu and .vtp. Its XML is that which VTK's writers make:
 // elements with attributes, comments, declarations, no entities.
 
-#include "base/vec3.h"
 #include "formats/mesh/vtk_numbers.h"
+#include "geometry/vec3.h"
 
 #include <cstddef>
 #include <cstdint>

@@ -1,7 +1,7 @@
 #pragma once
 // Reader of VTK's surfaces in XML, .vtp, see gewebe_mesh(5).
 
-#include "base/mesh.h"
+#include "geometry/mesh.h"
 
 #include <cstdint>
 #include <string>

@@ -2,8 +2,8 @@
 // ELA_EXPL, the text form of the deformable model; the grammar is in ela_expl(5).
 
 #include "base/context.h"
-#include "base/space.h"
 #include "formats/stream/stream.h"
+#include "geometry/space.h"
 #include "model/model.h"
 
 #include <string>

@@ -1,7 +1,7 @@
-#include "base/number_text.h"
 #include "base/parallel.h"
 #include "formats/model/ela.h"
 #include "formats/model/ela_internal.h"
+#include "text/number_text.h"
 
 #include <algorithm>
 #include <array>

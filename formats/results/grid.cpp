@@ -1,6 +1,6 @@
-#include "base/mesh.h"
 #include "contact/instrument_surface.h"
 #include "formats/results/grid_internal.h"
+#include "geometry/mesh.h"
 
 #include <algorithm>
 #include <limits>

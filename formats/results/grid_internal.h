@@ -2,11 +2,11 @@
 // All objects and instruments of a frame as one unstructured grid of VTK's, which files of several
 // kinds hold.
 
-#include "base/vec3.h"
 #include "contact/instrument.h"
+#include "fem/stress.h"
 #include "formats/results/results_writer.h"
+#include "geometry/vec3.h"
 #include "model/model.h"
-#include "solid/stress.h"
 
 #include <array>
 #include <cstddef>

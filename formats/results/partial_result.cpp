@@ -1,11 +1,11 @@
 #include "formats/results/partial_result.h"
 
 #include "base/error.h"
-#include "base/number_text.h"
 #include "formats/results/xdmf_internal.h"
 #include "formats/store/hdf5_internal.h"
 #include "formats/stream/descriptor.h"
 #include "formats/stream/file_names.h"
+#include "text/number_text.h"
 
 #include <algorithm>
 #include <array>

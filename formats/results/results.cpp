@@ -1,9 +1,9 @@
 #include "formats/results/results.h"
 
 #include "base/error.h"
+#include "embedding/skin.h"
 #include "formats/results/result_groups_internal.h"
 #include "formats/store/hdf5_internal.h"
-#include "solid/skin.h"
 
 #include <algorithm>
 #include <cmath>

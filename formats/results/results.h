@@ -2,9 +2,9 @@
 // Results of a run: HDF5 with an XDMF beside it; gewebe_results(5). This header is what readers
 // need.
 
-#include "base/mesh.h"
-#include "base/vec3.h"
 #include "contact/instrument.h"
+#include "geometry/mesh.h"
+#include "geometry/vec3.h"
 #include "tetrahedra/tet_mesh.h"
 
 #include <array>

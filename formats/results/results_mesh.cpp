@@ -1,10 +1,10 @@
 #include "formats/results/results_mesh.h"
 
 #include "base/error.h"
+#include "embedding/skin.h"
 #include "formats/mesh/obj_stl.h"
 #include "formats/mesh/ply.h"
 #include "formats/results/series_internal.h"
-#include "solid/skin.h"
 
 #include <algorithm>
 #include <optional>

@@ -1,9 +1,9 @@
 #include "formats/results/results_vtu.h"
 // Based on: VTK file formats, docs.vtk.org, "XML file formats".
 
-#include "base/number_text.h"
 #include "formats/results/grid_internal.h"
 #include "formats/results/series_internal.h"
+#include "text/number_text.h"
 
 #include <cstdint>
 #include <optional>

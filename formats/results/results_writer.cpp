@@ -1,7 +1,7 @@
 #include "formats/results/results_writer.h"
 
 #include "base/error.h"
-#include "base/number_text.h"
+#include "embedding/skin.h"
 #include "formats/results/instrument_sets_internal.h"
 #include "formats/results/partial_result.h"
 #include "formats/results/results_mesh.h"
@@ -10,7 +10,7 @@
 #include "formats/results/xdmf_internal.h"
 #include "formats/store/hdf5_internal.h"
 #include "formats/stream/file_names.h"
-#include "solid/skin.h"
+#include "text/number_text.h"
 
 #include <algorithm>
 #include <cmath>

@@ -4,10 +4,10 @@
 
 #include "contact/instrument.h"
 #include "contact/load.h"
+#include "fem/stress.h"
 #include "formats/stream/kind.h"
 #include "formats/stream/stream.h"
 #include "model/model.h"
-#include "solid/stress.h"
 
 #include <cstddef>
 #include <cstdint>

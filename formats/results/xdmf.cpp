@@ -1,7 +1,7 @@
 #include "formats/results/xdmf_internal.h"
 
-#include "base/number_text.h"
 #include "formats/results/result_groups_internal.h"
+#include "text/number_text.h"
 
 #include <algorithm>
 #include <optional>

@@ -1,9 +1,9 @@
 #pragma once
 // The commands of a scene, scene(5), as data.
 
+#include "integrator/solid_motion.h"
 #include "model/selector.h"
 #include "scene/change.h"
-#include "solid/solid_motion.h"
 
 #include <optional>
 #include <string>

@@ -1,8 +1,8 @@
 #include "formats/scene/frames_binary.h"
 
 #include "base/error.h"
-#include "base/vector_at.h"
 #include "formats/scene/scene_answer.h"
+#include "geometry/vector_at.h"
 
 #include <cmath>
 #include <cstddef>

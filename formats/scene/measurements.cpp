@@ -1,9 +1,9 @@
 #include "formats/scene/measurements.h"
 
 #include "base/error.h"
-#include "base/nearest_word.h"
 #include "formats/scene/scene.h"
 #include "formats/scene/words.h"
+#include "text/nearest_word.h"
 
 #include <algorithm>
 #include <array>

@@ -1,9 +1,9 @@
 #pragma once
 // What a body was measured to do under known loads, as text: gewebe_measurements(5).
 
-#include "base/vec3.h"
+#include "fit/young_fit.h"
+#include "geometry/vec3.h"
 #include "model/selector.h"
-#include "solid/young_fit.h"
 
 #include <string>
 #include <string_view>

@@ -1,10 +1,10 @@
 #include "formats/scene/scene.h"
 
 #include "base/error.h"
-#include "base/nearest_word.h"
 #include "formats/scene/verbs_internal.h"
 #include "formats/scene/words.h"
-#include "solid/solid_motion.h"
+#include "integrator/solid_motion.h"
+#include "text/nearest_word.h"
 
 #include <algorithm>
 #include <array>

@@ -1,6 +1,6 @@
 #include "formats/scene/scene_answer.h"
 
-#include "base/vector_at.h"
+#include "geometry/vector_at.h"
 
 #include <algorithm>
 #include <array>

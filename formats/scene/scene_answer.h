@@ -1,8 +1,8 @@
 #pragma once
 // What a scene answers to a step, as text: gewebe_serve(5).
 
+#include "fem/stress.h"
 #include "scene/simulation.h"
-#include "solid/stress.h"
 
 #include <cstddef>
 #include <cstdint>

@@ -1,9 +1,9 @@
 #include "formats/scene/scene_query.h"
 
 #include "base/error.h"
-#include "base/number_text.h"
-#include "base/vector_at.h"
 #include "formats/scene/scene_answer.h"
+#include "geometry/vector_at.h"
+#include "text/number_text.h"
 
 #include <cstddef>
 #include <cstdint>

@@ -1,7 +1,7 @@
 #pragma once
 // The words of a line of text, taken one by one, as scene(5) and gewebe_measurements(5) have them.
 
-#include "base/vec3.h"
+#include "geometry/vec3.h"
 #include "model/selector.h"
 
 #include <cstddef>

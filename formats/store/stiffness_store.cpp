@@ -3,7 +3,7 @@
 #include "base/crc32c.h"
 #include "base/digest.h"
 #include "base/error.h"
-#include "compliance/compressed_columns.h"
+#include "columns/compressed_columns.h"
 #include "formats/store/hdf5_internal.h"
 #include "formats/store/stiffness_store_internal.h"
 

@@ -2,9 +2,9 @@
 // The stiffness store, an HDF5 file with one group per object; stiffness_store(5). This header is
 // what readers need.
 
-#include "base/columns.h"
+#include "columns/columns.h"
+#include "linalg/factor.h"
 #include "model/model.h"
-#include "solve/factor.h"
 
 #include <cstdint>
 #include <memory>

@@ -4,7 +4,7 @@
 #include "base/crc32c.h"
 #include "base/digest.h"
 #include "base/error.h"
-#include "compliance/compliance_columns.h"
+#include "columns/compliance_columns.h"
 #include "formats/store/column_journal_internal.h"
 #include "formats/store/hdf5_internal.h"
 #include "formats/store/stiffness_store_internal.h"

@@ -1,12 +1,12 @@
 #pragma once
 // Makes a stiffness store; stiffness_store(5).
 
-#include "base/columns.h"
-#include "compliance/column_compression.h"
+#include "columns/column_compression.h"
+#include "columns/columns.h"
 #include "formats/store/stiffness_store.h"
 #include "formats/stream/stream.h"
-#include "solve/factor.h"
-#include "solve/stiffness.h"
+#include "linalg/factor.h"
+#include "linalg/stiffness.h"
 
 #include <cstddef>
 #include <cstdint>

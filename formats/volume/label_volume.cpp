@@ -1,9 +1,9 @@
 #include "formats/volume/label_volume.h"
 
 #include "base/error.h"
-#include "base/number_text.h"
 #include "formats/stream/file_names.h"
 #include "formats/volume/label_volume_internal.h"
+#include "text/number_text.h"
 
 #include <algorithm>
 #include <bit>

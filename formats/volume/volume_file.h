@@ -2,8 +2,8 @@
 // Volumes as OpenVDB streams (gewebe_volume(5)): one float grid, on a pipe as in a file. The same
 // content gives the same bytes: the UUID of the stream is derived from the content.
 
-#include "base/space.h"
 #include "formats/stream/stream.h"
+#include "geometry/space.h"
 #include "volume/grid.h"
 
 #include <string>

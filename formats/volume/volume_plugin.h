@@ -4,10 +4,10 @@
 // a volume comes. It stands beside the program or in ../lib/gewebe from there, and stays loaded.
 
 #include "base/context.h"
-#include "base/mesh.h"
+#include "geometry/mesh.h"
 #include "shading/volume_view.h"
 #include "tetrahedra/tet_mesh.h"
-#include "voxelize/voxelize.h"
+#include "voxelization/voxelize.h"
 
 #include <cstdint>
 #include <string>
@@ -30,8 +30,8 @@ struct SurfaceFilling {
   OpenMesh on_open = OpenMesh::refuse;
 };
 
-/// Tetrahedra that fill a surface: jones_density (voxelize/distance_ramp.h) on voxels at multiples
-/// of `voxel`, then stuff (stuffing/stuffing.h).
+/// Tetrahedra that fill a surface: jones_density (antialiasing/distance_ramp.h) on voxels at
+/// multiples of `voxel`, then stuff (stuffing/stuffing.h).
 struct FilledSurface {
   /// Without parts of their own without materials; else a tetrahedron has as material the place in
   /// `parts` of that with the least volume of those that hold it, or their number. Faces follow the

@@ -1,12 +1,12 @@
 // In gewebe-volume.so alone.
 
+#include "antialiasing/distance_ramp.h"
 #include "base/error.h"
 #include "formats/volume/volume_file.h"
 #include "formats/volume/volume_plugin_internal.h"
 #include "stuffing/materials.h"
 #include "stuffing/stuffing.h"
 #include "volume/csg.h"
-#include "voxelize/distance_ramp.h"
 
 #include <algorithm>
 #include <cmath>

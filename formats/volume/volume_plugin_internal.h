@@ -2,8 +2,8 @@
 // What gewebe-volume.so offers. One compiler makes it and its programs.
 
 #include "base/context.h"
-#include "base/mesh.h"
 #include "formats/volume/volume_plugin.h"
+#include "geometry/mesh.h"
 #include "shading/volume_view.h"
 #include "tetrahedra/tet_mesh.h"
 

@@ -1,8 +1,8 @@
 #pragma once
 // Bounding volume hierarchy over axis-aligned boxes.
 
-#include "base/boxes_meet.h"
-#include "base/vec3.h"
+#include "geometry/boxes_meet.h"
+#include "geometry/vec3.h"
 
 #include <array>
 #include <cstddef>

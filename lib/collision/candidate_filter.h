@@ -1,9 +1,9 @@
 #pragma once
 // Filter of candidates: selects those whose present distance may be below a bound.
 
-#include "base/vec3.h"
 #include "collision/candidates.h"
 #include "collision/surface.h"
+#include "geometry/vec3.h"
 
 #include <cstddef>
 #include <cstdint>

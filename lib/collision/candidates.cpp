@@ -1,10 +1,10 @@
 #include "collision/candidates.h"
 
-#include "base/boxes_meet.h"
-#include "base/larger.h"
 #include "collision/distance.h"
 #include "collision/edge_triangle.h"
 #include "collision/pair_feature.h"
+#include "geometry/boxes_meet.h"
+#include "numeric/larger.h"
 
 #include <algorithm>
 #include <cmath>

@@ -1,10 +1,10 @@
 #pragma once
 // Broad phase: pairs of primitives that may come close on the way from x0 to x1.
 
-#include "base/vec3.h"
 #include "collision/bvh.h"
 #include "collision/ccd.h"
 #include "collision/surface.h"
+#include "geometry/vec3.h"
 
 #include <array>
 #include <cstddef>

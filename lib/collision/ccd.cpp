@@ -1,7 +1,7 @@
 #include "collision/ccd.h"
 
-#include "base/larger.h"
 #include "collision/distance.h"
+#include "numeric/larger.h"
 
 #include <algorithm>
 #include <array>

@@ -5,7 +5,7 @@
 // bounded along the line between the closest points (B. Mirtich, 1996), so that primitives that
 // slide along each other are no obstacle.
 
-#include "base/vec3.h"
+#include "geometry/vec3.h"
 
 #include <cstddef>
 #include <span>

@@ -5,7 +5,7 @@
 // al., Incremental Potential Contact, ACM TOG 39(4), 2020. What remains is one of four types of
 // distance without constraints, smooth in its vertices. All positions in mm.
 
-#include "base/vec3.h"
+#include "geometry/vec3.h"
 
 #include <array>
 #include <cstdint>

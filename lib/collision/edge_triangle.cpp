@@ -1,6 +1,6 @@
 #include "collision/edge_triangle.h"
 
-#include "base/exact_predicates.h"
+#include "geometry/exact_predicates.h"
 
 #include <array>
 #include <cmath>

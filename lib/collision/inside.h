@@ -1,7 +1,7 @@
 #pragma once
 // Whether a point lies inside a closed surface.
 
-#include "base/vec3.h"
+#include "geometry/vec3.h"
 
 #include <array>
 #include <cstdint>

@@ -1,8 +1,8 @@
 #pragma once
 // Closest features of a candidate pair, by its number of vertices.
 
-#include "base/vec3.h"
 #include "collision/distance.h"
+#include "geometry/vec3.h"
 
 #include <array>
 #include <cstddef>

@@ -2,7 +2,7 @@
 // Collision surface: vertices of all bodies and instruments with their points, edges and triangles,
 // as plain arrays.
 
-#include "base/vec3.h"
+#include "geometry/vec3.h"
 
 #include <array>
 #include <cstddef>

@@ -2,9 +2,9 @@
 
 #include "base/error.h"
 #include "contact/load.h"
-#include "solid/model_stiffness.h"
-#include "solve/condition.h"
-#include "solve/stiffness.h"
+#include "fem/model_stiffness.h"
+#include "linalg/condition.h"
+#include "linalg/stiffness.h"
 
 #include <string>
 #include <utility>

@@ -2,8 +2,8 @@
 // Factor of K with vectors over all 3 n axes of a model, held axes included.
 
 #include "base/context.h"
+#include "linalg/factor.h"
 #include "model/model.h"
-#include "solve/factor.h"
 
 #include <cstddef>
 #include <cstdint>

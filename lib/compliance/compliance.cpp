@@ -1,10 +1,10 @@
 #include "compliance/compliance.h"
 
 #include "base/error.h"
-#include "base/vector_at.h"
-#include "compliance/compressed_columns.h"
-#include "compliance/costs.h"
+#include "columns/compressed_columns.h"
+#include "columns/costs.h"
 #include "compliance/forward_blocks.h"
+#include "geometry/vector_at.h"
 
 #include <algorithm>
 #include <cmath>

@@ -1,19 +1,19 @@
 #pragma once
 // Compliance C = K⁻¹ of a model as one operator: blocks between a few nodes, rows under a few
 // forces, whole shapes. It hides its data (compliance/compliance_source.h) and the choice of the
-// cheapest way (compliance/costs.h): single entries and sums of a few columns come from memory,
+// cheapest way (columns/costs.h): single entries and sums of a few columns come from memory,
 // solutions for loads on many nodes from the factor.
 //
-// Stored columns may have rows for the first m nodes only (base/columns.h). Sums of columns then
+// Stored columns may have rows for the first m nodes only (columns/columns.h). Sums of columns then
 // have these rows only, and inner nodes cost nothing; solve() gives all rows. Columns of the other
 // nodes are solved for, and have all rows.
 
 #include "base/context.h"
-#include "compliance/column_cache.h"
+#include "columns/column_cache.h"
 #include "compliance/compliance_source.h"
 #include "contact/load.h"
+#include "linalg/condition.h"
 #include "model/model.h"
-#include "solve/condition.h"
 
 #include <cstddef>
 #include <cstdint>

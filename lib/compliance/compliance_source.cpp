@@ -1,7 +1,7 @@
 #include "compliance/compliance_source.h"
 
+#include "columns/costs.h"
 #include "compliance/axis_solver.h"
-#include "compliance/costs.h"
 
 #include <optional>
 #include <utility>

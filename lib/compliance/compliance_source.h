@@ -3,10 +3,10 @@
 // or a correction of these after a cut. The functions below create sources. Their user
 // (compliance/compliance.h) is the same for all.
 
-#include "base/columns.h"
 #include "base/context.h"
+#include "columns/columns.h"
+#include "linalg/factor.h"
 #include "model/model.h"
-#include "solve/factor.h"
 
 #include <array>
 #include <cstddef>

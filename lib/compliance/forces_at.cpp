@@ -1,7 +1,7 @@
 #include "compliance/forces_at.h"
 
-#include "base/vector_at.h"
-#include "compliance/costs.h"
+#include "columns/costs.h"
+#include "geometry/vector_at.h"
 
 #include <algorithm>
 #include <cmath>

@@ -3,7 +3,7 @@
 // after cuts. Contact forces need only these blocks, and no column of C.
 
 #include "compliance/compliance_source.h"
-#include "solve/frontal_factor.h"
+#include "linalg/frontal_factor.h"
 
 #include <cstdint>
 #include <functional>

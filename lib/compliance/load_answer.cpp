@@ -1,7 +1,7 @@
 #include "compliance/load_answer.h"
 
-#include "base/vector_at.h"
-#include "solid/model_stiffness.h"
+#include "fem/model_stiffness.h"
+#include "geometry/vector_at.h"
 
 #include <algorithm>
 #include <utility>

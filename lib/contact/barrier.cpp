@@ -1,8 +1,8 @@
 #include "contact/barrier.h"
 
-#include "base/larger.h"
-#include "base/logarithm.h"
-#include "base/perpendicular.h"
+#include "geometry/perpendicular.h"
+#include "numeric/larger.h"
+#include "numeric/logarithm.h"
 
 #include <cmath>
 #include <cstddef>

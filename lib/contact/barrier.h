@@ -3,8 +3,8 @@
 // b(s) = -(s - S)^2 ln(s / S) for 0 < s < S, else 0, of s = d^2 - d_min^2, where d is the distance
 // of a pair and S = (d_min + d_hat)^2 - d_min^2. Lengths in mm.
 
-#include "base/vec3.h"
 #include "contact/contact_pairs.h"
+#include "geometry/vec3.h"
 
 #include <array>
 #include <cstdint>

@@ -1,7 +1,7 @@
 #include "contact/condensed_system.h"
 
 #include "base/error.h"
-#include "solve/block_cholesky.h"
+#include "cholesky/block_cholesky.h"
 
 #include <Eigen/Core>
 

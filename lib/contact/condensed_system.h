@@ -13,8 +13,8 @@
 // carried to their targets by c alone.
 
 #include "base/cpu.h"
-#include "base/vec3.h"
 #include "contact/contact_body.h"
+#include "geometry/vec3.h"
 
 #include <array>
 #include <cstddef>

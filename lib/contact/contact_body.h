@@ -9,7 +9,7 @@
 // x = x_free + A^-1 S^T f, and the solver needs the rows of the compliance W = S A^-1 S^T alone.
 // In dynamics A = M/h^2 + K, at rest A = K. A linear body is one whose model is exact.
 
-#include "base/vec3.h"
+#include "geometry/vec3.h"
 
 #include <array>
 #include <cstddef>

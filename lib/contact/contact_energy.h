@@ -2,13 +2,13 @@
 // The energy of contact in a step, barrier and lagged friction of the pairs at given positions, and
 // how stiff the barrier is.
 
-#include "base/vec3.h"
 #include "collision/candidates.h"
 #include "contact/barrier.h"
 #include "contact/condensed_system.h"
 #include "contact/contact_pairs.h"
 #include "contact/friction.h"
 #include "contact/step.h"
+#include "geometry/vec3.h"
 
 #include <array>
 #include <cstdint>

@@ -2,10 +2,10 @@
 // Active contact pairs: what of the candidates is closer than d_hat, reduced to closest features,
 // each once with a weight (NormalCollisions of ipc-toolkit with collision set type IPC).
 
-#include "base/vec3.h"
 #include "collision/candidates.h"
 #include "collision/distance.h"
 #include "collision/surface.h"
+#include "geometry/vec3.h"
 
 #include <array>
 #include <cstdint>

@@ -1,8 +1,8 @@
 #include "contact/convex_core.h"
 
 #include "base/error.h"
-#include "base/rounded_text.h"
 #include "mesh/edges.h"
+#include "text/rounded_text.h"
 
 #include <algorithm>
 #include <cmath>

@@ -2,9 +2,9 @@
 // Convex polyhedra: the cores of instruments that are meshes. Faces are flat polygons, whatever
 // triangles they came as, so that neither an edge nor a corner lies within a flat part.
 
-#include "base/mesh.h"
-#include "base/vec3.h"
 #include "contact/instrument.h"
+#include "geometry/mesh.h"
+#include "geometry/vec3.h"
 
 #include <array>
 #include <cstddef>

@@ -9,7 +9,7 @@
 // (backward Euler, which takes from the hand what damper and spring lose and never gives more).
 // Its place gives way to F, its turn is the hand's.
 
-#include "base/vec3.h"
+#include "geometry/vec3.h"
 
 #include <cmath>
 

@@ -1,6 +1,6 @@
 #include "contact/friction.h"
 
-#include "base/perpendicular.h"
+#include "geometry/perpendicular.h"
 
 #include <cmath>
 #include <cstddef>

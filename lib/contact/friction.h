@@ -4,10 +4,10 @@
 // closest points are those of an earlier position, and u is the tangential displacement since the
 // start of the step. f0'(u) = 2 u/e - (u/e)^2 for u < e, else 1. Lengths in mm.
 
-#include "base/vec3.h"
 #include "collision/surface.h"
 #include "contact/barrier.h"
 #include "contact/contact_pairs.h"
+#include "geometry/vec3.h"
 
 #include <array>
 #include <cstdint>

@@ -4,7 +4,7 @@
 // push nothing. All are convex, so that for any unit vector n all that lies beyond the support
 // plane n·y = support(n) is outside.
 
-#include "base/vec3.h"
+#include "geometry/vec3.h"
 
 #include <cstdint>
 #include <memory>

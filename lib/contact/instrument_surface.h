@@ -1,9 +1,9 @@
 #pragma once
 // Instruments as triangles, for who shows them.
 
-#include "base/mesh.h"
-#include "base/vec3.h"
 #include "contact/instrument.h"
+#include "geometry/mesh.h"
+#include "geometry/vec3.h"
 
 #include <cstddef>
 #include <vector>

@@ -2,12 +2,12 @@
 // Bodies that may touch each other, stepped together.
 
 #include "base/context.h"
-#include "base/vec3.h"
 #include "collision/surface.h"
 #include "contact/contact_body.h"
 #include "contact/instrument.h"
 #include "contact/parameters.h"
 #include "contact/step.h"
+#include "geometry/vec3.h"
 #include "model/model.h"
 
 #include <array>

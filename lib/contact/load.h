@@ -1,8 +1,8 @@
 #pragma once
 // What acts on one object, whichever method simulates it.
 
-#include "base/vec3.h"
 #include "contact/instrument.h"
+#include "geometry/vec3.h"
 #include "model/model.h"
 
 #include <array>

@@ -1,7 +1,7 @@
 #pragma once
 // Contact forces on nodes of an object, as results tell them.
 
-#include "base/vec3.h"
+#include "geometry/vec3.h"
 
 #include <algorithm>
 #include <cstdint>

@@ -1,8 +1,8 @@
 #include "contact/step.h"
 
-#include "base/rounded_text.h"
 #include "contact/contact_energy.h"
 #include "contact/swept_candidates.h"
+#include "text/rounded_text.h"
 
 #include <algorithm>
 #include <cmath>
@@ -342,8 +342,8 @@ bool StepSolver::Work::iterate(CondensedSystem& system, int iteration, bool& con
 }
 
 /// Ends the step where renewals of friction's lag do not converge: contacts that change places with
-/// their neighbours for ever would take all its iterations. \param change  of friction forces by the
-/// last renewal, over the largest force
+/// their neighbours for ever would take all its iterations. \param change  of friction forces by
+/// the last renewal, over the largest force
 void StepSolver::Work::require_settling(double change) {
   ++slow_lags_;
   if (change <= lag_change_ / 2) {

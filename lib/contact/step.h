@@ -15,11 +15,11 @@
 
 #include "base/context.h"
 #include "base/error.h"
-#include "base/vec3.h"
 #include "collision/candidates.h"
 #include "collision/surface.h"
 #include "contact/condensed_system.h"
 #include "contact/parameters.h"
+#include "geometry/vec3.h"
 
 #include <cstddef>
 #include <cstdint>

@@ -1,10 +1,10 @@
 #pragma once
 // Candidates of the ways that vertices are expected to go, and how far along they may.
 
-#include "base/vec3.h"
 #include "collision/candidate_filter.h"
 #include "collision/candidates.h"
 #include "contact/step.h"
+#include "geometry/vec3.h"
 
 #include <cstdint>
 #include <span>

@@ -7,7 +7,7 @@
 // which equals 1 − 22/9 t + 17/9 t² − 4/9 t³ but keeps its sign and its digits near t = 1.
 
 #include "base/context.h"
-#include "base/particles.h"
+#include "geometry/particles.h"
 #include "volume/grid.h"
 
 #include <cstdint>

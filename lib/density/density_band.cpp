@@ -1,6 +1,6 @@
-#include "base/index_map.h"
 #include "base/parallel.h"
 #include "density/density_blocks_internal.h"
+#include "geometry/index_map.h"
 
 #include <algorithm>
 #include <array>

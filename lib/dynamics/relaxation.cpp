@@ -5,7 +5,7 @@
 #include "dynamics/elastodynamic.h"
 #include "dynamics/spring_kernel.h"
 #include "dynamics/spring_layout.h"
-#include "solve/condition.h"
+#include "linalg/condition.h"
 
 #include <algorithm>
 #include <cmath>

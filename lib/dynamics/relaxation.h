@@ -11,11 +11,11 @@
 // convergence: a node's mass is twice the sum of the stiffness of its springs, springs do not damp,
 // and drag damps the slowest mode ω_min critically (Underwood, Dynamic relaxation, 1983).
 
-#include "base/columns.h"
 #include "base/context.h"
+#include "columns/columns.h"
+#include "linalg/factor.h"
+#include "linalg/stiffness.h"
 #include "model/model.h"
-#include "solve/factor.h"
-#include "solve/stiffness.h"
 
 #include <cstdint>
 #include <span>

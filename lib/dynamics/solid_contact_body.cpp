@@ -1,6 +1,6 @@
 #include "dynamics/solid_contact_body.h"
 
-#include "base/vector_at.h"
+#include "geometry/vector_at.h"
 
 #include <algorithm>
 #include <array>

@@ -1,12 +1,12 @@
 #pragma once
 // A solid, or a net with implicit steps, as the contact solver sees it. Its compliance is that of
-// the quadratic models of solid/solid_motion.h, in frames that rotate with the nodes or in the
+// the quadratic models of integrator/solid_motion.h, in frames that rotate with the nodes or in the
 // fixed frame.
 
 #include "base/context.h"
 #include "contact/contact_body.h"
 #include "contact/island.h"
-#include "solid/solid_motion.h"
+#include "integrator/solid_motion.h"
 
 #include <cstddef>
 #include <cstdint>

@@ -1,13 +1,13 @@
 #include "dynamics/solid_dynamic.h"
 
 #include "base/error.h"
-#include "base/larger.h"
-#include "base/number_text.h"
-#include "base/vector_at.h"
 #include "dynamics/spring_force.h"
-#include "solid/assembly.h"
-#include "solid/model_stiffness.h"
-#include "solid/solid_model.h"
+#include "fem/assembly.h"
+#include "fem/model_stiffness.h"
+#include "fem/solid_model.h"
+#include "geometry/vector_at.h"
+#include "numeric/larger.h"
+#include "text/number_text.h"
 
 #include <algorithm>
 #include <chrono>

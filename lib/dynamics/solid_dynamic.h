@@ -1,7 +1,7 @@
 #pragma once
 // Implicit integration of solids, and of nets that are too stiff for explicit steps. A solid is a
 // model with tetrahedra, perhaps with springs beside them. The steps are those of
-// solid/solid_motion.h, under the loads of a scene.
+// integrator/solid_motion.h, under the loads of a scene.
 //
 // Nodes have the masses of their tetrahedra and the model's drag per mass. Weight acts by the same
 // nodal loads as in statics (weight_of), so that a solid at rest has its static shape. Forces and
@@ -15,8 +15,8 @@
 #include "contact/load.h"
 #include "dynamics/body_motion.h"
 #include "dynamics/solid_contact_body.h"
+#include "integrator/solid_motion.h"
 #include "model/model.h"
-#include "solid/solid_motion.h"
 
 #include <any>
 #include <cstdint>

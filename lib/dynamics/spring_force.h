@@ -5,7 +5,7 @@
 // j by exactly the opposite, bit for bit. Drag brakes a node by -d v. A spring whose ends coincide
 // (within 1e-150 mm) has no direction and exerts no force.
 
-#include "base/vec3.h"
+#include "geometry/vec3.h"
 #include "model/model.h"
 
 #include <cstddef>

@@ -3,7 +3,7 @@
 
 #include "base/context.h"
 #include "shading/drawing.h"
-#include "shading/surface_material.h"
+#include "texture/surface_material.h"
 
 #include <epoxy/gl.h>
 

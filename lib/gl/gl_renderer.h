@@ -6,8 +6,8 @@
 #include "gl/gl_context.h"
 #include "shading/camera.h"
 #include "shading/drawing.h"
-#include "shading/image.h"
-#include "shading/surface_material.h"
+#include "texture/image.h"
+#include "texture/surface_material.h"
 
 #include <cstdint>
 #include <memory>

@@ -2,7 +2,7 @@
 // The emboss shader.
 
 #include "shading/drawing.h"
-#include "shading/surface_material.h"
+#include "texture/surface_material.h"
 
 #include <epoxy/gl.h>
 

@@ -1,9 +1,9 @@
 #include "labels/label_density.h"
 
 #include "base/error.h"
-#include "base/number_text.h"
 #include "base/parallel.h"
 #include "labels/label_field_internal.h"
+#include "text/number_text.h"
 
 #include <algorithm>
 #include <array>

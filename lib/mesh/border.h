@@ -3,7 +3,7 @@
 // an odd number of triangles. By index unless stated otherwise.
 
 #include "base/disjoint_sets.h"
-#include "base/mesh.h"
+#include "geometry/mesh.h"
 
 #include <array>
 #include <cstdint>

@@ -2,7 +2,7 @@
 // What can be said about a triangle mesh: is it closed, manifold, oriented, and how well shaped.
 
 #include "base/context.h"
-#include "base/mesh.h"
+#include "geometry/mesh.h"
 #include "mesh/quality.h"
 
 #include <cstdint>

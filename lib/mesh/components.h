@@ -1,7 +1,7 @@
 #pragma once
 // The largest components of a mesh.
 
-#include "base/mesh.h"
+#include "geometry/mesh.h"
 
 #include <cstdint>
 

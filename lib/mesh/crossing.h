@@ -3,7 +3,7 @@
 // they share its points and edges.
 
 #include "base/error.h"
-#include "base/mesh.h"
+#include "geometry/mesh.h"
 
 #include <array>
 #include <cstdint>

@@ -1,6 +1,6 @@
 #include "mesh/crossing.h"
 
-#include "base/boxes_meet.h"
+#include "geometry/boxes_meet.h"
 #include "mesh/sheets.h"
 
 #include <CGAL/Exact_predicates_inexact_constructions_kernel.h>

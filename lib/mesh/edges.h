@@ -4,7 +4,7 @@
 // pass over all edges, EdgeTable for access by number.
 
 #include "base/context.h"
-#include "base/mesh.h"
+#include "geometry/mesh.h"
 
 #include <array>
 #include <cstddef>

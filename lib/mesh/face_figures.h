@@ -2,7 +2,7 @@
 // What each face of a mesh is like, and what can be said of all: areas, angles, volumes.
 
 #include "base/context.h"
-#include "base/mesh.h"
+#include "geometry/mesh.h"
 
 #include <array>
 #include <cstddef>

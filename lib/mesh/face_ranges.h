@@ -4,7 +4,7 @@
 // faces follow their places.
 
 #include "base/context.h"
-#include "base/mesh.h"
+#include "geometry/mesh.h"
 
 #include <algorithm>
 #include <cstddef>

@@ -3,7 +3,7 @@
 // edges and points.
 
 #include "base/context.h"
-#include "base/mesh.h"
+#include "geometry/mesh.h"
 
 #include <cstdint>
 #include <vector>

@@ -1,7 +1,7 @@
 #pragma once
 // The point of a triangle that is nearest to another point.
 
-#include "base/vec3.h"
+#include "geometry/vec3.h"
 
 namespace gewebe {
 

@@ -3,7 +3,7 @@
 // springs allow.
 
 #include "base/context.h"
-#include "base/mesh.h"
+#include "geometry/mesh.h"
 #include "mesh/face_figures.h"
 #include "mesh/fans.h"
 

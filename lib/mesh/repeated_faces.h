@@ -1,7 +1,7 @@
 #pragma once
 // Faces that stand twice in a mesh.
 
-#include "base/mesh.h"
+#include "geometry/mesh.h"
 
 #include <cstddef>
 #include <cstdint>

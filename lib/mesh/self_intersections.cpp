@@ -1,9 +1,9 @@
 #include "mesh/self_intersections.h"
 
-#include "base/exact_predicates.h"
 #include "base/parallel.h"
 #include "collision/bvh.h"
 #include "collision/edge_triangle.h"
+#include "geometry/exact_predicates.h"
 
 #include <algorithm>
 #include <array>

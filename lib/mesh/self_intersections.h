@@ -2,7 +2,7 @@
 // Does a mesh cut itself?
 
 #include "base/context.h"
-#include "base/mesh.h"
+#include "geometry/mesh.h"
 
 #include <array>
 #include <cstddef>

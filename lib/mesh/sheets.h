@@ -3,7 +3,7 @@
 // for. Both look at each corner a few times and walk round no point, so that a point under many
 // faces costs what they do.
 
-#include "base/mesh.h"
+#include "geometry/mesh.h"
 
 #include <array>
 #include <cstddef>

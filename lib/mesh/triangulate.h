@@ -1,7 +1,7 @@
 #pragma once
 // Triangles for a polygon in space.
 
-#include "base/mesh.h"
+#include "geometry/mesh.h"
 
 #include <cstddef>
 #include <span>

@@ -2,12 +2,12 @@
 
 #include "base/error.h"
 #include "base/huge_pages.h"
-#include "base/number_text.h"
 #include "base/parallel.h"
 #include "mesh/edges.h"
 #include "mesh/face_ranges.h"
 #include "model/check.h"
 #include "model/usable_surface.h"
+#include "text/number_text.h"
 
 #include <algorithm>
 #include <array>

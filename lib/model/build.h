@@ -2,7 +2,7 @@
 // A deformable model from a triangle mesh (report FZKA 7190, section 3.1.3; exp2ela(1)).
 
 #include "base/context.h"
-#include "base/mesh.h"
+#include "geometry/mesh.h"
 #include "model/material.h"
 #include "model/model.h"
 

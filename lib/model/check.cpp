@@ -1,7 +1,7 @@
 #include "model/check.h"
 
 #include "base/error.h"
-#include "base/number_text.h"
+#include "text/number_text.h"
 
 #include <algorithm>
 #include <cmath>

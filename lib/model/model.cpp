@@ -3,9 +3,9 @@
 #include "base/digest.h"
 #include "base/disjoint_sets.h"
 #include "base/error.h"
-#include "base/number_text.h"
 #include "base/parallel.h"
 #include "model/check.h"
+#include "text/number_text.h"
 
 #include <algorithm>
 #include <cmath>

@@ -24,8 +24,8 @@
 //   - its triangles have three different points, and an existing material;
 //   - its `texcoords` are empty or complete.
 
-#include "base/mesh.h"
-#include "base/vec3.h"
+#include "geometry/mesh.h"
+#include "geometry/vec3.h"
 
 #include <array>
 #include <cstddef>
@@ -87,7 +87,7 @@ struct Spring {
 };
 
 /// Embedded surface: it follows the elements of a model in pictures and written shapes, without
-/// forces in either direction. solid/skin.h describes how a point follows.
+/// forces in either direction. embedding/skin.h describes how a point follows.
 struct Skin {
   std::vector<Vec3> points;                     ///< at rest, mm
   std::vector<std::uint32_t> tetrahedron;       ///< one per point: the element that it follows

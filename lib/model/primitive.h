@@ -2,7 +2,7 @@
 // The matrix primitives of the report (3.1.1): surfaces whose nodes stand in a matrix of m times n,
 // with the regular springs that follow from it.
 
-#include "base/mesh.h"
+#include "geometry/mesh.h"
 
 #include <cstdint>
 #include <string_view>

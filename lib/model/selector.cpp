@@ -1,9 +1,9 @@
 #include "model/selector.h"
 
 #include "base/error.h"
-#include "base/number_text.h"
 #include "mesh/border.h"
 #include "model/selector_internal.h"
+#include "text/number_text.h"
 
 #include <algorithm>
 #include <array>

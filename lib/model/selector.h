@@ -1,7 +1,7 @@
 #pragma once
 // Selectors of nodes of a model, the language of gewebe_selector(7).
 
-#include "base/vec3.h"
+#include "geometry/vec3.h"
 #include "model/model.h"
 
 #include <cstddef>

@@ -2,7 +2,7 @@
 // Clean-up of a mesh for a net of springs: used faces and points with new numbers.
 
 #include "base/context.h"
-#include "base/mesh.h"
+#include "geometry/mesh.h"
 #include "mesh/edges.h"
 
 #include <cstddef>

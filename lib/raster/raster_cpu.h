@@ -5,8 +5,8 @@
 #include "base/context.h"
 #include "shading/camera.h"
 #include "shading/drawing.h"
-#include "shading/image.h"
-#include "shading/surface_material.h"
+#include "texture/image.h"
+#include "texture/surface_material.h"
 
 #include <cstdint>
 

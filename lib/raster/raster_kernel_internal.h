@@ -1,7 +1,7 @@
 #pragma once
 // The inner loops of our rasteriser, once per CPU level, with the same bytes on each.
 
-#include "shading/solid_plan.h"
+#include "texture/solid_plan.h"
 
 #include <cstddef>
 #include <cstdint>

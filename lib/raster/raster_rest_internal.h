@@ -3,7 +3,7 @@
 
 #include "raster/raster_kernel_internal.h"
 #include "shading/drawing.h"
-#include "shading/surface_material.h"
+#include "texture/surface_material.h"
 
 #include <optional>
 

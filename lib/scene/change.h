@@ -5,8 +5,8 @@
 #include "contact/coupling.h"
 #include "contact/instrument.h"
 #include "contact/load.h"
-#include "model/cut_select.h"
-#include "solid/tear_solid.h"
+#include "cutting/cut_select.h"
+#include "cutting/tear_solid.h"
 #include "statics/two_step.h"
 
 #include <cstddef>

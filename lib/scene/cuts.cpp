@@ -1,12 +1,12 @@
 // Cuts: what they sever when they take effect, what comes off, what it means for the methods.
 
-#include "base/vector_at.h"
-#include "cutting/cut_stiffness.h"
+#include "cutting/skin_parts.h"
+#include "embedding/solid_place.h"
+#include "fem/solid_model.h"
+#include "geometry/vector_at.h"
+#include "linalg/condition.h"
 #include "scene/rules_internal.h"
-#include "solid/skin_parts.h"
-#include "solid/solid_model.h"
-#include "solid/solid_place.h"
-#include "solve/condition.h"
+#include "update/cut_stiffness.h"
 
 #include <algorithm>
 #include <cmath>

@@ -1,6 +1,6 @@
 #include "scene/extents.h"
 
-#include "base/vector_at.h"
+#include "geometry/vector_at.h"
 #include "scene/world_internal.h"
 
 #include <algorithm>

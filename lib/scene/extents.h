@@ -3,7 +3,7 @@
 // the nodes at its first use in an advance. The entry of a body at rest is kept while the body
 // rests.
 
-#include "base/vec3.h"
+#include "geometry/vec3.h"
 
 #include <cstddef>
 #include <map>

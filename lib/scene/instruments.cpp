@@ -1,6 +1,6 @@
 // Instruments: where they go and what they grasp.
 
-#include "base/vector_at.h"
+#include "geometry/vector_at.h"
 #include "scene/rules_internal.h"
 
 #include <algorithm>

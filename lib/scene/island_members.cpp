@@ -1,6 +1,6 @@
 #include "scene/island_members_internal.h"
 
-#include "base/vector_at.h"
+#include "geometry/vector_at.h"
 
 #include <algorithm>
 #include <cmath>

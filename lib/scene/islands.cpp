@@ -2,7 +2,7 @@
 // move, elastostatic objects and instruments. What is far from everything moves by itself.
 
 #include "base/disjoint_sets.h"
-#include "base/vector_at.h"
+#include "geometry/vector_at.h"
 #include "scene/extents.h"
 #include "scene/island_members_internal.h"
 #include "scene/rules_internal.h"

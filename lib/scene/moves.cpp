@@ -1,7 +1,7 @@
 // Renumbering of nodes: updates everything that refers to nodes of an object after a cut.
 
 #include "base/disjoint_sets.h"
-#include "base/vector_at.h"
+#include "geometry/vector_at.h"
 #include "scene/rules_internal.h"
 
 #include <algorithm>

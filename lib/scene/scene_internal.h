@@ -6,13 +6,13 @@
 #include "base/copy_on_write.h"
 #include "contact/coupling.h"
 #include "contact/nodal_contact_force.h"
-#include "cutting/cut_stiffness.h"
 #include "dynamics/body_motion.h"
 #include "dynamics/solid_dynamic.h"
 #include "scene/extents.h"
 #include "scene/simulation.h"
 #include "scene/support.h"
 #include "statics/warped_statics.h"
+#include "update/cut_stiffness.h"
 
 #include <any>
 #include <array>

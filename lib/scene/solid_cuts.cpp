@@ -1,13 +1,13 @@
 // Cuts of solids: planes at rest, blades where the solid is, piece by piece of their ways.
 
-#include "base/boxes_meet.h"
-#include "base/number_text.h"
-#include "base/vector_at.h"
+#include "cutting/cut_skin.h"
+#include "cutting/cut_solid.h"
+#include "embedding/solid_place.h"
+#include "fem/solid_model.h"
+#include "geometry/boxes_meet.h"
+#include "geometry/vector_at.h"
 #include "scene/world_internal.h"
-#include "solid/cut_skin.h"
-#include "solid/cut_solid.h"
-#include "solid/solid_model.h"
-#include "solid/solid_place.h"
+#include "text/number_text.h"
 
 #include <algorithm>
 #include <array>

@@ -3,8 +3,8 @@
 // Friction counts from where they stood.
 
 #include "base/disjoint_sets.h"
-#include "base/vector_at.h"
 #include "collision/distance.h"
+#include "geometry/vector_at.h"
 #include "scene/island_members_internal.h"
 
 #include <algorithm>

@@ -1,8 +1,8 @@
 // The solvers of elastostatic objects: of one step, of two, made when they are needed.
 
+#include "fem/model_stiffness.h"
+#include "linalg/stiffness.h"
 #include "scene/rules_internal.h"
-#include "solid/model_stiffness.h"
-#include "solve/stiffness.h"
 #include "statics/second_stage.h"
 
 #include <algorithm>

@@ -1,10 +1,10 @@
 // Tearing: springs that are stretched too far, elements of solids that bear too much.
 
-#include "base/number_text.h"
-#include "base/vector_at.h"
+#include "cutting/cut_skin.h" // MeetingOfNoSheets
+#include "cutting/tear_solid.h"
+#include "geometry/vector_at.h"
 #include "scene/rules_internal.h"
-#include "solid/cut_skin.h" // MeetingOfNoSheets
-#include "solid/tear_solid.h"
+#include "text/number_text.h"
 
 #include <optional>
 #include <string>

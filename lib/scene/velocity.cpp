@@ -1,8 +1,8 @@
 // How fast elastostatic objects move: as their load does. What a cut frees of one goes on so.
 
-#include "base/vector_at.h"
+#include "geometry/vector_at.h"
+#include "linalg/condition.h"
 #include "scene/world_internal.h"
-#include "solve/condition.h"
 
 #include <optional>
 #include <span>

@@ -2,8 +2,8 @@
 // Internals of Simulation: its state, and the functions that work on it, grouped by source file.
 
 #include "base/error.h"
-#include "base/number_text.h"
 #include "scene/scene_internal.h"
+#include "text/number_text.h"
 
 #include <algorithm>
 #include <cstddef>

@@ -2,8 +2,8 @@
 // barrier can part them. Their nodes are moved apart by a small part of an edge.
 
 #include "base/error.h"
-#include "base/vector_at.h"
 #include "contact/parameters.h"
+#include "geometry/vector_at.h"
 #include "scene/world_internal.h"
 
 #include <algorithm>

@@ -1,7 +1,7 @@
 #pragma once
 // Where the picture is taken from, and how the world comes to lie on it.
 
-#include "base/vec3.h"
+#include "geometry/vec3.h"
 
 #include <array>
 #include <cstdint>

@@ -2,11 +2,11 @@
 // What both backends draw: vertices with texture coordinates and emboss offsets. Report 3.2.3.
 
 #include "base/context.h"
-#include "base/mesh.h"
-#include "base/vec3.h"
+#include "geometry/mesh.h"
+#include "geometry/vec3.h"
 #include "shading/camera.h"
-#include "shading/rest.h"
 #include "shading/tangents.h"
+#include "texture/rest.h"
 
 #include <array>
 #include <cstddef>

@@ -1,6 +1,6 @@
 #include "shading/endoscope.h"
 
-#include "shading/surface_material.h"
+#include "texture/surface_material.h"
 
 #include <algorithm>
 #include <cmath>

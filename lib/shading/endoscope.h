@@ -1,9 +1,9 @@
 #pragma once
 // What an endoscope sees: the light at its tip, the lens before it, the round field.
 
-#include "base/vec3.h"
+#include "geometry/vec3.h"
 #include "shading/camera.h"
-#include "shading/image.h"
+#include "texture/image.h"
 
 namespace gewebe {
 

@@ -4,7 +4,7 @@
 // every level gives the same bits, for there is no fused multiplication.
 
 #include "base/cpu.h"
-#include "base/vec3.h"
+#include "geometry/vec3.h"
 
 #include <array>
 #include <cstddef>

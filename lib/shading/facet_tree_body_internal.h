@@ -1,7 +1,7 @@
 #pragma once
 // The body of facet_tree_*.cpp; each of them compiles it for its instruction set.
 
-#include "base/four_lanes.h"
+#include "numeric/four_lanes.h"
 #include "shading/facet_tree.h"
 
 #include <cmath>

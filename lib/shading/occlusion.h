@@ -2,8 +2,8 @@
 // Ambient occlusion of surfaces.
 
 #include "base/context.h"
-#include "base/mesh.h"
-#include "base/vec3.h"
+#include "geometry/mesh.h"
+#include "geometry/vec3.h"
 
 #include <cstddef>
 #include <span>

@@ -1,7 +1,7 @@
 #pragma once
 // Conversions of surfaces for styles of drawing.
 
-#include "base/mesh.h"
+#include "geometry/mesh.h"
 #include "shading/camera.h"
 #include "shading/drawing.h"
 

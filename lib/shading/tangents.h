@@ -3,8 +3,8 @@
 // surface. Report 3.2.3; Lengyel, Mathematics for 3D Game Programming and Computer Graphics, 2003.
 
 #include "base/context.h"
-#include "base/mesh.h"
-#include "base/vec3.h"
+#include "geometry/mesh.h"
+#include "geometry/vec3.h"
 
 #include <array>
 #include <cstddef>

@@ -3,8 +3,8 @@
 #include "base/error.h"
 #include "base/parallel.h"
 #include "shading/angles.h"
-#include "shading/rest.h"
 #include "shading/tangents.h"
+#include "texture/rest.h"
 
 #include <algorithm>
 #include <cmath>

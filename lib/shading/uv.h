@@ -2,8 +2,8 @@
 // Texture coordinates for meshes that have none.
 
 #include "base/context.h"
-#include "base/mesh.h"
-#include "base/vec3.h"
+#include "geometry/mesh.h"
+#include "geometry/vec3.h"
 #include "shading/drawing.h"
 
 #include <array>

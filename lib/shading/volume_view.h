@@ -3,9 +3,9 @@
 // ramp, and translucent ones. Report 4.1 and 4.2, figures 4-1 and 4-5.
 
 #include "base/context.h"
-#include "base/vec3.h"
+#include "geometry/vec3.h"
 #include "shading/camera.h"
-#include "shading/color_ramp.h"
+#include "texture/color_ramp.h"
 #include "volume/grid.h"
 
 #include <array>

@@ -2,12 +2,12 @@
 
 #include "base/error.h"
 #include "base/unique_number.h"
-#include "base/vector_at.h"
 #include "compliance/compliance.h"
 #include "compliance/forces_at.h"
 #include "compliance/load_answer.h"
-#include "solid/model_stiffness.h"
-#include "solve/stiffness.h"
+#include "fem/model_stiffness.h"
+#include "geometry/vector_at.h"
+#include "linalg/stiffness.h"
 #include "statics/held_contacts.h"
 
 #include <algorithm>

@@ -11,9 +11,9 @@
 // Forces are computed first, the shape when it is first read. Earlier results are reused: a grasp
 // that moves rigidly costs as much for a hundred nodes as for twelve.
 //
-// The stored columns of a solid may have rows for its surface only (base/columns.h). Forces and the
-// shape of the surface then cost as much as those of a net with as many nodes. One solve finds the
-// displacements inside when the whole shape is first read.
+// The stored columns of a solid may have rows for its surface only (columns/columns.h). Forces and
+// the shape of the surface then cost as much as those of a net with as many nodes. One solve finds
+// the displacements inside when the whole shape is first read.
 
 #include "base/context.h"
 #include "contact/load.h"

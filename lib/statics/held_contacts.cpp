@@ -1,8 +1,8 @@
 #include "statics/held_contacts.h"
 
-#include "base/vector_at.h"
 #include "compliance/load_answer.h"
-#include "solid/model_stiffness.h"
+#include "fem/model_stiffness.h"
+#include "geometry/vector_at.h"
 
 #include <algorithm>
 #include <cmath>

@@ -3,12 +3,12 @@
 // u_f + K_cc d.
 
 #include "base/context.h"
+#include "columns/column_cache.h"
 #include "compliance/axis_solver.h"
-#include "compliance/column_cache.h"
 #include "compliance/shape_modes.h"
 #include "contact/load.h"
+#include "fem/model_stiffness.h"
 #include "model/model.h"
-#include "solid/model_stiffness.h"
 
 #include <cstddef>
 #include <cstdint>

@@ -1,6 +1,6 @@
 #include "statics/linear_range.h"
 
-#include "base/vector_at.h"
+#include "geometry/vector_at.h"
 
 #include <algorithm>
 #include <cmath>

@@ -1,7 +1,7 @@
 #include "statics/static_contact_body.h"
 
-#include "base/vector_at.h"
 #include "contact/island.h"
+#include "geometry/vector_at.h"
 
 #include <algorithm>
 #include <cmath>

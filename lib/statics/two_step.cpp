@@ -1,7 +1,7 @@
 #include "statics/two_step.h"
 
 #include "base/error.h"
-#include "base/vector_at.h"
+#include "geometry/vector_at.h"
 
 #include <Eigen/Cholesky>
 #include <Eigen/Core>

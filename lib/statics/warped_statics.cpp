@@ -1,10 +1,10 @@
 #include "statics/warped_statics.h"
 
 #include "base/error.h"
-#include "base/vector_at.h"
 #include "compliance/compliance.h"
 #include "compliance/load_answer.h"
-#include "solid/solid_model.h"
+#include "fem/solid_model.h"
+#include "geometry/vector_at.h"
 
 #include <algorithm>
 #include <cmath>

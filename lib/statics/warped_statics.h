@@ -1,6 +1,6 @@
 #pragma once
 // Corotational statics: elastostatic method of a solid with large rotations. It uses
-// solid/rotation_warp.h over the compliance of the linear method, by stored columns or a factor.
+// statics/rotation_warp.h over the compliance of the linear method, by stored columns or a factor.
 //
 // Forces on up to 64 nodes, reactions of displaced nodes and forces on touched nodes are applied by
 // the nodes' columns. Weight, and forces on more nodes or on inner ones, are rotated back and
@@ -10,7 +10,7 @@
 #include "base/context.h"
 #include "contact/load.h"
 #include "model/model.h"
-#include "solid/rotation_warp.h"
+#include "statics/rotation_warp.h"
 
 #include <cstddef>
 #include <cstdint>

@@ -3,7 +3,7 @@
 // (i + ½, j + ½, k + ½), each point joined to 6 of its own kind by long edges (of length 1) and to
 // 8 of the other by short ones (of length √¾). For the room alone.
 
-#include "base/vec3.h"
+#include "geometry/vec3.h"
 #include "stuffing/stuffing.h"
 
 #include <array>

@@ -1,8 +1,8 @@
 #include "base/error.h"
-#include "base/index_map.h"
-#include "base/number_text.h"
 #include "base/parallel.h"
+#include "geometry/index_map.h"
 #include "stuffing/lattice_internal.h"
+#include "text/number_text.h"
 #include "volume/field.h"
 
 #include <algorithm>

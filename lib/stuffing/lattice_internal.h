@@ -3,7 +3,7 @@
 // For the room alone.
 
 #include "base/context.h"
-#include "base/vec3.h"
+#include "geometry/vec3.h"
 #include "stuffing/bcc_internal.h"
 #include "volume/grid.h"
 

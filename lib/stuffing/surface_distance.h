@@ -2,7 +2,7 @@
 // How far a boundary lies from the isosurface that it stands for.
 
 #include "base/context.h"
-#include "base/mesh.h"
+#include "geometry/mesh.h"
 #include "stuffing/stuffing.h"
 #include "volume/grid.h"
 

@@ -1,7 +1,7 @@
 #pragma once
 // Removes faces without area by flipping their longest edges; for surface/snapping.cpp.
 
-#include "base/mesh.h"
+#include "geometry/mesh.h"
 
 #include <cstdint>
 #include <vector>

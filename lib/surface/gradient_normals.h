@@ -2,7 +2,7 @@
 // Normals of an isosurface from the gradient of its volume.
 
 #include "base/context.h"
-#include "base/mesh.h"
+#include "geometry/mesh.h"
 #include "volume/grid.h"
 
 #include <cstdint>

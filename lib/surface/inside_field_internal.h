@@ -6,7 +6,7 @@
 // region everything is found by index; only regions are hashed.
 
 #include "base/context.h"
-#include "base/index_map.h"
+#include "geometry/index_map.h"
 #include "volume/grid.h"
 
 #include <array>

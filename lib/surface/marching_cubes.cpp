@@ -2,11 +2,11 @@
 
 #include "base/error.h"
 #include "base/huge_pages.h"
-#include "base/number_text.h"
 #include "base/parallel.h"
 #include "surface/inside_field_internal.h"
 #include "surface/marching_cubes_table.h"
 #include "surface/surface_blocks_internal.h"
+#include "text/number_text.h"
 
 #include <algorithm>
 #include <array>

@@ -2,7 +2,7 @@
 // Marching cubes over a sparse volume: a closed triangle mesh of the isosurface.
 
 #include "base/context.h"
-#include "base/mesh.h"
+#include "geometry/mesh.h"
 #include "volume/grid.h"
 
 #include <cstdint>

@@ -2,7 +2,7 @@
 // Improvement of the triangles of an isosurface: edges are flipped, and points slide along it.
 
 #include "base/context.h"
-#include "base/mesh.h"
+#include "geometry/mesh.h"
 #include "volume/grid.h"
 
 #include <cstdint>

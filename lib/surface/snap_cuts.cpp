@@ -1,8 +1,8 @@
 #include "surface/snap_cuts_internal.h"
 
-#include "base/boxes_meet.h"
 #include "base/parallel.h"
 #include "collision/bvh.h"
+#include "geometry/boxes_meet.h"
 #include "mesh/self_intersections.h"
 
 #include <algorithm>

@@ -2,7 +2,7 @@
 // Which faces of a snapped mesh cut each other; for surface/snapping.cpp.
 
 #include "base/context.h"
-#include "base/mesh.h"
+#include "geometry/mesh.h"
 #include "surface/surface_blocks_internal.h"
 
 #include <array>

@@ -2,7 +2,7 @@
 // Which points of an isosurface snap to which corner of its lattice; for surface/snapping.cpp.
 
 #include "base/context.h"
-#include "base/index_map.h"
+#include "geometry/index_map.h"
 #include "surface/surface_blocks_internal.h"
 
 #include <array>

@@ -3,7 +3,7 @@
 // better triangles. The mesh stays valid (report FZKA 7190, section 3.1.4).
 
 #include "base/context.h"
-#include "base/mesh.h"
+#include "geometry/mesh.h"
 #include "surface/marching_cubes.h"
 
 #include <cstdint>

@@ -1,7 +1,7 @@
 #pragma once
 // The surface of a tetrahedral mesh.
 
-#include "base/mesh.h"
+#include "geometry/mesh.h"
 #include "tetrahedra/tet_mesh.h"
 
 #include <array>

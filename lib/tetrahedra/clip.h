@@ -1,8 +1,8 @@
 #pragma once
 // A solid cut open by a plane: what is left of its boundary, and the faces of the cut.
 
-#include "base/mesh.h"
-#include "base/vec3.h"
+#include "geometry/mesh.h"
+#include "geometry/vec3.h"
 #include "tetrahedra/tet_mesh.h"
 
 #include <cstddef>

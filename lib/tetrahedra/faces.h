@@ -2,7 +2,7 @@
 // Tables of the faces and edges of tetrahedra, with the tetrahedra at each: the base of all
 // algorithms for neighbours and the boundary.
 
-#include "base/mesh.h"
+#include "geometry/mesh.h"
 #include "tetrahedra/tet_mesh.h"
 
 #include <cstddef>

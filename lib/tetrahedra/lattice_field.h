@@ -3,7 +3,7 @@
 // functions.
 
 #include "base/context.h"
-#include "base/vec3.h"
+#include "geometry/vec3.h"
 #include "tetrahedra/tet_mesh.h"
 
 #include <array>

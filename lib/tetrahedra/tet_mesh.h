@@ -1,8 +1,8 @@
 #pragma once
 // Tetrahedral mesh, the data exchanged between stages.
 
-#include "base/mesh.h"
-#include "base/vec3.h"
+#include "geometry/mesh.h"
+#include "geometry/vec3.h"
 
 #include <array>
 #include <cstdint>

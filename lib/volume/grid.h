@@ -9,7 +9,7 @@
 // 4096³ voxels; all else has the background value.
 
 #include "base/context.h"
-#include "base/vec3.h"
+#include "geometry/vec3.h"
 
 #include <array>
 #include <cstddef>

@@ -1,7 +1,7 @@
 #include "volume/lattice.h"
 
 #include "base/error.h"
-#include "base/number_text.h"
+#include "text/number_text.h"
 
 #include <algorithm>
 #include <cmath>

@@ -8,6 +8,9 @@
 //
 // Meshes are the liver and the colon of $GEWEBE_SHARED/data where they are, else made ones.
 
+#include "antialiasing/coverage.h"
+#include "antialiasing/distance_band_internal.h"
+#include "antialiasing/distance_ramp.h"
 #include "formats/image/image_file.h"
 #include "formats/mesh/mesh_file.h"
 #include "surface/marching_cubes.h"
@@ -16,10 +19,7 @@
 #include "tests/unit/mesh_fixtures.h"
 #include "volume/lattice.h"
 #include "volume/volume_stats.h"
-#include "voxelize/coverage.h"
-#include "voxelize/distance_band_internal.h"
-#include "voxelize/distance_ramp.h"
-#include "voxelize/voxelize.h"
+#include "voxelization/voxelize.h"
 
 #include <algorithm>
 #include <cmath>

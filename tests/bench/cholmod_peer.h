@@ -1,8 +1,8 @@
 #pragma once
 // CHOLMOD beside our factor, for the benchmarks.
 
-#include "solve/factor.h"
-#include "solve/stiffness.h"
+#include "linalg/factor.h"
+#include "linalg/stiffness.h"
 
 #include <cholmod.h>
 

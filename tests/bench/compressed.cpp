@@ -9,12 +9,12 @@
 // of a sum of plain columns of float32, and of compressed ones: medians of runs that take turns.
 
 #include "base/error.h"
-#include "compliance/column_cache.h"
-#include "compliance/column_compression.h"
-#include "compliance/compliance_columns.h"
+#include "columns/column_cache.h"
+#include "columns/column_compression.h"
+#include "columns/compliance_columns.h"
+#include "fem/assembly.h"
 #include "formats/tetrahedra/tet_file.h"
-#include "solid/assembly.h"
-#include "solve/factor.h"
+#include "linalg/factor.h"
 #include "stuffing/stuffing.h"
 #include "tests/bench/timing.h"
 #include "tests/unit/larger.h"

@@ -8,9 +8,9 @@
 
 #include "base/huge_pages.h"
 #include "base/parallel.h"
-#include "compliance/column_sum.h"
+#include "columns/column_sum.h"
+#include "fem/model_stiffness.h"
 #include "model/build.h"
-#include "solid/model_stiffness.h"
 #include "statics/elastostatic.h"
 #include "tests/bench/memory_columns.h"
 #include "tests/bench/timing.h"

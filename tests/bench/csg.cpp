@@ -10,7 +10,7 @@
 #include "tests/unit/mesh_fixtures.h"
 #include "volume/grid_internal.h"
 #include "volume/lattice.h"
-#include "voxelize/voxelize.h"
+#include "voxelization/voxelize.h"
 
 #include <openvdb/tools/Composite.h>
 

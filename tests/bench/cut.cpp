@@ -7,17 +7,17 @@
 // percentile in ms, a figure and its unit.
 
 #include "compliance/axis_solver.h"
-#include "cutting/cut_stiffness.h"
-#include "cutting/stiffness_change.h"
-#include "cutting/woodbury.h"
+#include "fem/model_stiffness.h"
+#include "linalg/stiffness.h"
 #include "model/build.h"
-#include "solid/model_stiffness.h"
-#include "solve/stiffness.h"
 #include "tests/bench/timing.h"
 #include "tests/unit/larger.h"
 #include "tests/unit/mesh_fixtures.h"
 #include "tests/unit/random_cuts.h"
 #include "tests/unit/relative_difference.h"
+#include "update/cut_stiffness.h"
+#include "update/stiffness_change.h"
+#include "update/woodbury.h"
 
 #include <algorithm>
 #include <array>

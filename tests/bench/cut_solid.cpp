@@ -8,14 +8,13 @@
 //
 // Writes CSV to standard output: stage, median, 90th and 99th percentile, largest, unit.
 
-#include "solid/cut_solid.h"
+#include "cutting/cut_solid.h"
 #include "compliance/forward_blocks.h"
-#include "cutting/cut_stiffness.h"
+#include "cutting/cut.h"
+#include "fem/model_stiffness.h"
+#include "fem/solid_model.h"
 #include "formats/model/ela.h"
-#include "model/cut.h"
-#include "solid/model_stiffness.h"
-#include "solid/solid_model.h"
-#include "solve/factor.h"
+#include "linalg/factor.h"
 #include "tests/bench/cholmod_peer.h"
 #include "tests/bench/served.h"
 #include "tests/bench/timing.h"
@@ -23,6 +22,7 @@
 #include "tests/unit/tet_cut_checks.h"
 #include "tests/unit/tet_fixtures.h"
 #include "tests/unit/tet_organs.h"
+#include "update/cut_stiffness.h"
 
 #include <algorithm>
 #include <array>

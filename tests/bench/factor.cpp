@@ -6,10 +6,10 @@
 // median time in ms (of the processor where there is one thread), a figure and its unit. Words on
 // the command line choose among product, front, net, blocks, memory.
 
-#include "solve/factor.h"
-#include "solid/model_stiffness.h"
-#include "solve/multifrontal.h"
-#include "solve/stiffness.h"
+#include "linalg/factor.h"
+#include "cholesky/multifrontal.h"
+#include "fem/model_stiffness.h"
+#include "linalg/stiffness.h"
 #include "tests/bench/blas.h"
 #include "tests/bench/cholmod_peer.h"
 #include "tests/bench/timing.h"

@@ -1,10 +1,10 @@
 #pragma once
 // Columns of a compliance that stay in memory, as a store would give them, for the benchmarks.
 
-#include "base/columns.h"
-#include "compliance/compliance_columns.h"
+#include "columns/columns.h"
+#include "columns/compliance_columns.h"
 #include "compliance/compliance_source.h"
-#include "solve/condition.h"
+#include "linalg/condition.h"
 
 #include <algorithm>
 #include <memory>

@@ -6,9 +6,9 @@
 // Writes CSV to standard output: stage, program, surface nodes, nodes inside, median, fastest and
 // slowest time in ms, and the median over that of the net, all measured in turn.
 
+#include "fem/model_stiffness.h"
+#include "fem/solid_model.h"
 #include "model/build.h"
-#include "solid/model_stiffness.h"
-#include "solid/solid_model.h"
 #include "statics/elastostatic.h"
 #include "statics/warped_statics.h"
 #include "tests/bench/memory_columns.h"

@@ -13,10 +13,10 @@
 // at most beside the matrix, backward error of a solution.
 
 #include "base/error.h"
+#include "fem/model_stiffness.h"
+#include "fem/solid_model.h"
 #include "formats/model/ela.h"
-#include "solid/model_stiffness.h"
-#include "solid/solid_model.h"
-#include "solve/condition.h"
+#include "linalg/condition.h"
 #include "tests/bench/cholmod_peer.h"
 #include "tests/bench/peer.h"
 #include "tests/bench/timing.h"

@@ -8,11 +8,11 @@
 // 99 % quantile, and the unit. Arguments: steps (1000), of which every how manieth is compared
 // (97).
 
-#include "solid/solid_motion.h"
-#include "solid/assembly.h"
-#include "solid/corotational.h"
-#include "solve/factor.h"
-#include "solve/single_factor.h"
+#include "integrator/solid_motion.h"
+#include "fem/assembly.h"
+#include "fem/corotational.h"
+#include "linalg/factor.h"
+#include "linalg/single_factor.h"
 #include "tests/bench/timing.h"
 #include "tests/unit/tet_fixtures.h"
 #include "tetrahedra/order.h"

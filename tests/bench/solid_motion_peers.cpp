@@ -9,8 +9,8 @@
 // Writes CSV to standard output: stage, program, tetrahedra, step in s, threads, median, fastest
 // and slowest time of the processor for 0.2 s in ms, of three runs, error, what it is of.
 
-#include "solid/assembly.h"
-#include "solid/solid_motion.h"
+#include "fem/assembly.h"
+#include "integrator/solid_motion.h"
 #include "tests/bench/peer.h"
 #include "tests/bench/timing.h"
 #include "tests/unit/larger.h"

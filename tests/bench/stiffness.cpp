@@ -8,11 +8,11 @@
 // and slowest time in ms, a figure and its unit. Words on the command line choose among columns
 // (of the colon), colon and liver (their relaxation).
 
-#include "compliance/compliance_columns.h"
+#include "columns/compliance_columns.h"
 #include "dynamics/relaxation.h"
+#include "fem/model_stiffness.h"
+#include "linalg/condition.h"
 #include "model/build.h"
-#include "solid/model_stiffness.h"
-#include "solve/condition.h"
 #include "tests/bench/blas.h"
 #include "tests/bench/timing.h"
 #include "tests/unit/larger.h"

@@ -6,12 +6,12 @@
 // Writes CSV to standard output: stage, program, nodes (of the whole scene), columns, threads,
 // median, fastest and slowest time in ms, a figure and its unit.
 
-#include "compliance/compliance_columns.h"
+#include "columns/compliance_columns.h"
+#include "fem/model_stiffness.h"
 #include "formats/store/stiffness_store_writer.h"
+#include "linalg/condition.h"
 #include "model/build.h"
 #include "model/primitive.h"
-#include "solid/model_stiffness.h"
-#include "solve/condition.h"
 #include "tests/bench/timing.h"
 #include "tests/unit/scratch.h"
 

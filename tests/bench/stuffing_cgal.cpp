@@ -16,6 +16,7 @@
 // Arguments: some of size, cgal, tetgen, ftetwild, all where there are none; and few, which leaves
 // out the larger number of tetrahedra.
 
+#include "antialiasing/coverage.h"
 #include "formats/mesh/mesh_file.h"
 #include "formats/tetrahedra/tet_file.h"
 #include "stuffing/stuffing.h"
@@ -32,7 +33,6 @@
 #include "volume/field.h"
 #include "volume/lattice.h"
 #include "volume/resample.h"
-#include "voxelize/coverage.h"
 
 #include <CGAL/Exact_predicates_inexact_constructions_kernel.h>
 #include <CGAL/Labeled_mesh_domain_3.h>

@@ -14,6 +14,7 @@
 // over the voxel edge's square root (mesh/quality.h; comparable between volumes), zero-area faces,
 // pairs of triangles that cut each other.
 
+#include "antialiasing/coverage.h"
 #include "formats/mesh/mesh_file.h"
 #include "mesh/check.h"
 #include "mesh/quality.h"
@@ -27,7 +28,6 @@
 #include "tests/unit/mesh_fixtures.h"
 #include "tests/unit/surface_scenes.h"
 #include "volume/lattice.h"
-#include "voxelize/coverage.h"
 
 #include <CGAL/AABB_face_graph_triangle_primitive.h>
 #include <CGAL/AABB_traits.h>

@@ -7,7 +7,7 @@
 // Writes CSV to standard output as geometry.cpp does, and the peak of memory that one call adds to
 // the process, in MiB (0: not measured).
 
-#include "voxelize/voxelize.h"
+#include "voxelization/voxelize.h"
 #include "formats/mesh/mesh_file.h"
 #include "tests/bench/peer.h"
 #include "tests/bench/timing.h"

@@ -10,8 +10,8 @@
 
 #include "dynamics/elastodynamic.h"
 #include "dynamics/solid_dynamic.h"
+#include "fem/model_stiffness.h"
 #include "model/build.h"
-#include "solid/model_stiffness.h"
 #include "statics/elastostatic.h"
 #include "tests/bench/memory_columns.h"
 #include "tests/bench/timing.h"

@@ -10,8 +10,8 @@ right() { check "$@" >said.txt || fail "complained about $*:" "$(<said.txt)"; }
 wrong() { ! check "$@" >said.txt || fail "passed: $*"; }
 
 test_directions() {
-  right tools/a.cpp '#include "formats/stream/stream.h"' '#include "surface/x.h"' '#include "tools/shared/cli.h"' '#include "tools/run/x.h"'
-  right tools/run/a.cpp '#include "formats/scene/x.h"' '#include "tools/shared/cli.h"'
+  right tools/a.cpp '#include "formats/stream/stream.h"' '#include "surface/x.h"' '#include "tools/cli/cli.h"' '#include "tools/run/x.h"'
+  right tools/run/a.cpp '#include "formats/scene/x.h"' '#include "tools/cli/cli.h"'
   right formats/volume/a.cpp '#include "volume/grid.h"' '#include <openvdb/openvdb.h>'
   right lib/surface/a.cpp '#include "mesh/x.h"' '#include "base/x.h"' '#include "surface/x.h"' '#include <cmath>'
   right tests/unit/a.cpp '#include "mesh_fixtures.h"' '#include "scene/x.h"' '#include "tools/run/x.h"'
@@ -20,8 +20,8 @@ test_directions() {
   wrong lib/base/a.cpp '  #  include "volume/x.h"'
   wrong lib/model/a.cpp '#include "formats/stream/stream.h"'
   wrong formats/mesh/a.cpp '#include "formats/store/x.h"'
-  wrong formats/mesh/a.cpp '#include "tools/shared/cli.h"'
-  wrong tools/shared/a.cpp '#include "tools/run/x.h"'
+  wrong formats/mesh/a.cpp '#include "tools/cli/cli.h"'
+  wrong tools/cli/a.cpp '#include "tools/run/x.h"'
   wrong lib/model/a.cpp '#include "x.h"'
   wrong lib/model/a.cpp '#include "tests/x.h"'
   wrong lib/another/a.cpp '#include "base/x.h"'
@@ -29,7 +29,7 @@ test_directions() {
 }
 
 test_headers() {
-  right lib/base/a.h '#pragma once' '#include <vector>' '#include "base/vec3.h"'
+  right lib/base/a.h '#pragma once' '#include <vector>' '#include "base/error.h"'
   right lib/volume/a_internal.h '#pragma once' '#include <openvdb/openvdb.h>'
   wrong lib/base/a.h '#pragma once' '#include <openvdb/openvdb.h>'
   wrong formats/mesh/a.h '#pragma once' '#include <nlohmann/json.hpp>'

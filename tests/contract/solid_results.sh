@@ -429,7 +429,7 @@ P
   grep -q 'has no tetrahedra, expected a solid for rotation=warp' message || fail "$(cat message)"
 }
 
-# Forces of weight all go through a small support. Without smooth frames (solid/rotation_strain.h) the rounds turn the surface there, with less work than the
+# Forces of weight all go through a small support. Without smooth frames (statics/rotation_strain.h) the rounds turn the surface there, with less work than the
 # body's stiffness takes, and find no shape.
 test_a_soft_ball_stands_on_a_small_support() {
   need ffe-run exp2ela

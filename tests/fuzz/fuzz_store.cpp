@@ -1,7 +1,7 @@
 // Any bytes as a stiffness store: an Error or arrays that can be used, never a crash.
 
 #include "base/error.h"
-#include "compliance/compressed_columns.h"
+#include "columns/compressed_columns.h"
 #include "formats/store/stiffness_store.h"
 
 #include <cstddef>

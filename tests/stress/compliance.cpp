@@ -3,10 +3,10 @@
 // nodes with central springs, or a ball where there is no shared data. The negative control is a
 // column with one number changed. Argument: every how-many-th node has columns (default 1: all).
 
-#include "compliance/compliance_columns.h"
+#include "columns/compliance_columns.h"
+#include "fem/model_stiffness.h"
+#include "linalg/condition.h"
 #include "model/build.h"
-#include "solid/model_stiffness.h"
-#include "solve/condition.h"
 #include "tests/unit/larger.h"
 #include "tests/unit/mesh_fixtures.h"
 

@@ -4,17 +4,17 @@
 // held before the cut. Argument: how many cuts (default 200).
 
 #include "compliance/axis_solver.h"
-#include "cutting/cut_stiffness.h"
+#include "fem/model_stiffness.h"
+#include "linalg/condition.h"
+#include "linalg/stiffness.h"
 #include "model/build.h"
-#include "solid/model_stiffness.h"
-#include "solve/condition.h"
-#include "solve/stiffness.h"
 #include "statics/elastostatic.h"
 #include "tests/bench/memory_columns.h"
 #include "tests/unit/larger.h"
 #include "tests/unit/mesh_fixtures.h"
 #include "tests/unit/random_cuts.h"
 #include "tests/unit/relative_difference.h"
+#include "update/cut_stiffness.h"
 
 #include <algorithm>
 #include <array>

@@ -1,7 +1,7 @@
 #pragma once
 // Bodies of the programs of tests/stress that move solids, and of unit tests of what they found.
 
-#include "solid/solid_motion.h"
+#include "integrator/solid_motion.h"
 #include "tests/unit/larger.h"
 #include "tests/unit/tet_fixtures.h"
 #include "tetrahedra/order.h"

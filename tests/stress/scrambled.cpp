@@ -12,7 +12,7 @@
 // hundredth of quadratic Neo-Hookean ones. Each that fails is named with its seed. Status 1 if one
 // did, 2 if the arguments are others.
 
-#include "solid/solid_motion.h"
+#include "integrator/solid_motion.h"
 #include "tests/stress/motion_bodies.h"
 
 #include <charconv>

@@ -5,8 +5,8 @@
 // one goes on with that. Tells how many are, and times. Argument: number of cuts (default 1000).
 
 #include "base/error.h"
+#include "cutting/cut_skin.h"
 #include "mesh/check.h"
-#include "solid/cut_skin.h"
 #include "tests/stress/cuts_argument.h"
 #include "tests/unit/larger.h"
 #include "tests/unit/mesh_fixtures.h"

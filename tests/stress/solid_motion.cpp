@@ -8,7 +8,7 @@
 //
 // Argument: number of bodies (default 1500, of 40 steps).
 
-#include "solid/solid_motion.h"
+#include "integrator/solid_motion.h"
 #include "tests/stress/motion_bodies.h"
 #include "tests/unit/larger.h"
 

@@ -1,7 +1,7 @@
 #pragma once
 // What CGAL says of a mesh. For units compiled with -frounding-math.
 
-#include "base/mesh.h"
+#include "geometry/mesh.h"
 
 #include <CGAL/Polygon_mesh_processing/connected_components.h>
 #include <CGAL/Polygon_mesh_processing/polygon_soup_to_polygon_mesh.h>

@@ -1,8 +1,8 @@
 #pragma once
 // Random pairs of primitives for tests of distances and of continuous collision detection.
 
-#include "base/exact_predicates.h"
-#include "base/vec3.h"
+#include "geometry/exact_predicates.h"
+#include "geometry/vec3.h"
 
 #include <array>
 #include <cmath>

@@ -1,8 +1,8 @@
 #pragma once
 // Two wavy sheets close to each other, for tests of candidates and contact potentials.
 
-#include "base/vec3.h"
 #include "collision/surface.h"
+#include "geometry/vec3.h"
 
 #include <cmath>
 #include <cstdint>

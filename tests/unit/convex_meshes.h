@@ -1,8 +1,8 @@
 #pragma once
 // Convex meshes for tests of instruments that are one.
 
-#include "base/mesh.h"
-#include "base/vec3.h"
+#include "geometry/mesh.h"
+#include "geometry/vec3.h"
 
 #include <array>
 #include <cstddef>

@@ -1,12 +1,12 @@
 #pragma once
 // Bars of finite elements that tests cut: what they are, where, and what must hold of them.
 
+#include "embedding/skin.h"
+#include "fem/solid_model.h"
 #include "larger.h"
 #include "mesh/check.h"
 #include "model_meshes.h"
 #include "simulation_scenes.h"
-#include "solid/skin.h"
-#include "solid/solid_model.h"
 #include "tet_fixtures.h"
 
 #include <gtest/gtest.h>

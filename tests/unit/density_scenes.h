@@ -1,7 +1,7 @@
 #pragma once
 // Particle scenes and their density in long double, for the tests of the density.
 
-#include "base/particles.h"
+#include "geometry/particles.h"
 #include "tests/unit/larger.h"
 #include "volume/grid.h"
 

@@ -3,8 +3,8 @@
 // of its number, last of all; answers without numbers that are none; and shared shapes that are
 // those of the answers, to the last bit.
 
-#include "base/number_text.h"
 #include "formats/results/shared_shapes.h"
+#include "text/number_text.h"
 
 #include <cstddef>
 #include <cstdint>

@@ -1,7 +1,7 @@
 #pragma once
 // What keeps a NaN on its way to a bound. scripts/check-nan finds what does not.
 
-#include "base/larger.h"
+#include "numeric/larger.h"
 
 namespace gewebe::test {
 

@@ -1,10 +1,11 @@
 #pragma once
 // Columns of a compliance matrix that are kept in memory, and models for them.
 
-#include "base/columns.h"
+#include "columns/columns.h"
 #include "compliance/axis_solver.h"
 #include "compliance/compliance.h"
 #include "stiffness_models.h"
+#include "update/stiffness_change.h"
 
 #include <algorithm>
 #include <cstddef>

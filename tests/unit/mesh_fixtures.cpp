@@ -1,6 +1,6 @@
 #include "mesh_fixtures.h"
 
-#include "mesh/weld.h"
+#include "repair/weld.h"
 
 #include <cstring>
 #include <iterator>

@@ -1,9 +1,9 @@
 #pragma once
 // Meshes and helpers that the tests of voxelization share.
 
-#include "base/mesh.h"
+#include "geometry/mesh.h"
 #include "volume/grid.h"
-#include "voxelize/voxelize.h"
+#include "voxelization/voxelize.h"
 
 #include <cstdlib>
 #include <fstream>

@@ -1,7 +1,7 @@
 #pragma once
 // Small meshes for the tests of the model.
 
-#include "base/mesh.h"
+#include "geometry/mesh.h"
 
 #include <cmath>
 #include <cstdint>

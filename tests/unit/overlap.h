@@ -2,7 +2,7 @@
 // How deep closed surfaces are in each other or in themselves, by a geometry of its own: winding
 // numbers (of solid angles) and distances, of nodes and of points along edges.
 
-#include "base/mesh.h"
+#include "geometry/mesh.h"
 #include "larger.h"
 #include "mesh/nearest_point.h"
 

@@ -1,8 +1,8 @@
 #pragma once
 // Cuts at random places: springs around a node, or the surface opened by a small blade.
 
-#include "model/cut.h"
-#include "model/cut_select.h"
+#include "cutting/cut.h"
+#include "cutting/cut_select.h"
 #include "model/model.h"
 
 #include <algorithm>

@@ -1,7 +1,7 @@
 #pragma once
 // Distances of points, edges and triangles by rational numbers: exact.
 
-#include "base/vec3.h"
+#include "geometry/vec3.h"
 
 #include <algorithm>
 #include <array>

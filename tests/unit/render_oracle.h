@@ -2,13 +2,13 @@
 // The formula of the report, pixel by pixel, with one ray for each: slow, in double, and with
 // nothing of the library but the plain data that it is asked about.
 
-#include "base/mesh.h"
 #include "base/parallel.h"
+#include "geometry/mesh.h"
 #include "larger.h"
 #include "rest_oracle.h"
 #include "shading/camera.h"
-#include "shading/image.h"
-#include "shading/wet_film.h"
+#include "texture/image.h"
+#include "texture/wet_film.h"
 
 #include <algorithm>
 #include <array>

@@ -1,11 +1,11 @@
 #pragma once
 // Textures, surfaces and materials for pictures.
 
-#include "base/mesh.h"
+#include "geometry/mesh.h"
 #include "render_oracle.h"
-#include "shading/image.h"
-#include "shading/surface_material.h"
-#include "shading/texture.h"
+#include "texture/image.h"
+#include "texture/surface_material.h"
+#include "texture/texture.h"
 
 #include <cmath>
 #include <cstdint>

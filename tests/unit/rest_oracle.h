@@ -2,8 +2,8 @@
 // Textures on the shape at rest by their formulas (rest.h, solid_texture.h), in double and one
 // point at a time; nothing of the library but the plain data that they are asked about.
 
-#include "shading/rest.h"
-#include "shading/solid_texture.h"
+#include "texture/rest.h"
+#include "texture/solid_texture.h"
 
 #include <algorithm>
 #include <array>

@@ -1,7 +1,7 @@
 #pragma once
 // What the tests of scenes have in common: shapes as vectors, and cuts of an organ.
 
-#include "model/cut_select.h"
+#include "cutting/cut_select.h"
 #include "scene/simulation.h"
 #include "sim_models.h"
 

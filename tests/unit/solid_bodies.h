@@ -3,9 +3,9 @@
 // unit tests judge in small and tests/validate by work and error.
 
 #include "base/error.h"
-#include "solid/assembly.h"
-#include "solid/stress.h"
-#include "solve/factor.h"
+#include "fem/assembly.h"
+#include "fem/stress.h"
+#include "linalg/factor.h"
 #include "tests/unit/larger.h"
 #include "tests/unit/tet_fixtures.h"
 #include "tetrahedra/boundary.h"

@@ -2,8 +2,8 @@
 // Elastostatic blocks whose surfaces touch in scenes, and what tests ask of them.
 
 #include "base/context.h"
-#include "base/vector_at.h"
 #include "contact/instrument.h"
+#include "geometry/vector_at.h"
 #include "larger.h"
 #include "scene/simulation.h"
 #include "sim_models.h"

@@ -4,9 +4,9 @@
 #include "base/error.h"
 #include "base/parallel.h"
 #include "formats/mesh/mesh_file.h"
+#include "linalg/stiffness.h"
 #include "model/build.h"
 #include "model_meshes.h"
-#include "solve/stiffness.h"
 
 #include <cstdlib>
 #include <filesystem>

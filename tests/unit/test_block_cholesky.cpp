@@ -1,6 +1,6 @@
 // Cholesky factorisation of matrices of dense blocks, against Eigen's.
 
-#include "solve/block_cholesky.h"
+#include "cholesky/block_cholesky.h"
 
 #include "base/cpu.h"
 

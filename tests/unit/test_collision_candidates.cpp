@@ -1,7 +1,6 @@
 #include "collision/candidates.h"
 
 #include "base/error.h"
-#include "base/larger.h"
 #include "collision/bvh.h"
 #include "collision/candidate_filter.h"
 #include "collision/distance.h"
@@ -9,6 +8,7 @@
 #include "collision/inside.h"
 #include "collision_pairs.h"
 #include "collision_scene.h"
+#include "numeric/larger.h"
 #include "rational_distance.h"
 
 #include <algorithm>

@@ -1,5 +1,5 @@
 #include "base/cpu.h"
-#include "compliance/column_sum.h"
+#include "columns/column_sum.h"
 
 #include <cmath>
 #include <cstdint>

@@ -1,8 +1,8 @@
 // How a command line is taken apart, and how what it says is told.
 
 #include "base/error.h"
-#include "tools/shared/messages.h"
-#include "tools/shared/options_internal.h"
+#include "tools/cli/messages.h"
+#include "tools/cli/options_internal.h"
 
 #include <gtest/gtest.h>
 

@@ -1,12 +1,12 @@
 // Compliance of springs whose answer is known by hand: a chain, a truss, a net.
 
-#include "compliance/compliance_columns.h"
+#include "columns/compliance_columns.h"
 
 #include "dynamics/relaxation.h"
+#include "fem/model_stiffness.h"
 #include "larger.h"
+#include "linalg/condition.h"
 #include "mesh_fixtures.h"
-#include "solid/model_stiffness.h"
-#include "solve/condition.h"
 #include "stiffness_models.h"
 #include "tests/unit/relative_difference.h"
 

@@ -2,22 +2,22 @@
 // threads, sums as of plain columns.
 
 #include "base/error.h"
+#include "columns/column_compression.h"
+#include "columns/compliance_columns.h"
+#include "columns/crosses.h"
 #include "compliance/axis_solver.h"
-#include "compliance/column_compression.h"
-#include "compliance/compliance_columns.h"
-#include "compliance/crosses.h"
-#include "cutting/corrected_columns.h"
+#include "fem/assembly.h"
+#include "fem/model_stiffness.h"
+#include "linalg/condition.h"
+#include "linalg/factor.h"
 #include "made_columns.h"
-#include "solid/assembly.h"
-#include "solid/model_stiffness.h"
-#include "solve/condition.h"
-#include "solve/factor.h"
 #include "stuffing/stuffing.h"
 #include "surface_scenes.h"
 #include "tests/unit/larger.h"
 #include "tests/unit/stuffing_checks.h"
 #include "tet_fixtures.h"
 #include "tetrahedra/boundary.h"
+#include "update/corrected_columns.h"
 
 #include <gtest/gtest.h>
 

@@ -1,7 +1,7 @@
 // Condition estimates against known spectra; what moves freely is named rightly.
 
-#include "solid/model_stiffness.h"
-#include "solve/condition.h"
+#include "fem/model_stiffness.h"
+#include "linalg/condition.h"
 
 #include "stiffness_models.h"
 

@@ -2,8 +2,8 @@
 // inverted; and the same bytes everywhere.
 
 #include "base/cpu.h"
-#include "solid/assembly.h"
-#include "solid/corotational.h"
+#include "fem/assembly.h"
+#include "fem/corotational.h"
 #include "tests/unit/larger.h"
 #include "tests/unit/relative_difference.h"
 #include "tet_fixtures.h"

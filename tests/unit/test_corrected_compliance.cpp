@@ -1,15 +1,15 @@
 // The columns that a cut model takes over, as they go to a store.
 
-#include "cutting/corrected_compliance.h"
+#include "update/corrected_compliance.h"
 
 #include "base/error.h"
-#include "compliance/compliance_columns.h"
+#include "columns/compliance_columns.h"
 #include "cut_models.h"
+#include "fem/model_stiffness.h"
 #include "larger.h"
+#include "linalg/condition.h"
 #include "made_columns.h"
 #include "relative_difference.h"
-#include "solid/model_stiffness.h"
-#include "solve/condition.h"
 
 #include <gtest/gtest.h>
 

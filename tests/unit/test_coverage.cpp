@@ -1,13 +1,13 @@
 // Volume fractions of voxels: analytic cases, sums, ties, overlaps, comparison with samples.
 
+#include "antialiasing/coverage.h"
 #include "base/error.h"
 #include "mesh/border.h"
-#include "mesh/orient_closed.h"
 #include "mesh_fixtures.h"
+#include "repair/orient_closed.h"
 #include "tests/unit/larger.h"
 #include "volume/lattice.h"
 #include "volume/volume_stats.h"
-#include "voxelize/coverage.h"
 
 #include <gtest/gtest.h>
 

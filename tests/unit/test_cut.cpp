@@ -1,15 +1,15 @@
 // Cuts of models: what must be kept, whatever is cut.
 
 #include "base/error.h"
+#include "cutting/cut.h"
+#include "cutting/cut_select.h"
+#include "fem/model_stiffness.h"
 #include "larger.h"
+#include "linalg/stiffness.h"
 #include "mesh/check.h"
 #include "model/build.h"
-#include "model/cut.h"
-#include "model/cut_select.h"
 #include "model_meshes.h"
 #include "sim_models.h"
-#include "solid/model_stiffness.h"
-#include "solve/stiffness.h"
 #include "stiffness_models.h"
 
 #include <gtest/gtest.h>

@@ -1,11 +1,11 @@
 // Where the nodes of cut models come from: found again as the cut had it.
 
-#include "model/cut_origin.h"
+#include "cutting/cut_origin.h"
 
 #include "base/error.h"
-#include "cutting/stiffness_change.h"
-#include "model/cut.h"
+#include "cutting/cut.h"
 #include "stiffness_models.h"
+#include "update/stiffness_change.h"
 
 #include <gtest/gtest.h>
 

@@ -1,9 +1,9 @@
 // Skins of solids that a sheet cuts: closed, as large as before, with a rim where the sheet passes.
 
 #include "base/error.h"
+#include "cutting/cut_skin.h"
 #include "mesh/check.h"
 #include "model_meshes.h"
-#include "solid/cut_skin.h"
 #include "tests/unit/larger.h"
 
 #include <gtest/gtest.h>

@@ -1,11 +1,11 @@
 // Models of finite elements that a blade cuts: whole, as heavy as before, drawn as before but for
 // the wall, and weaker where they are cut.
 
+#include "cutting/cut_solid.h"
+#include "fem/model_stiffness.h"
+#include "fem/solid_model.h"
+#include "linalg/factor.h"
 #include "mesh/check.h"
-#include "solid/cut_solid.h"
-#include "solid/model_stiffness.h"
-#include "solid/solid_model.h"
-#include "solve/factor.h"
 #include "tests/unit/complaint.h"
 #include "tests/unit/larger.h"
 #include "tet_cut_checks.h"

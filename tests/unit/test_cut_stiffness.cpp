@@ -1,14 +1,14 @@
 // The stiffness of an object that is cut: whichever way it is followed, equal to a fresh one.
 
-#include "cutting/cut_stiffness.h"
+#include "update/cut_stiffness.h"
 
 #include "compliance/axis_solver.h"
+#include "cutting/cut_select.h"
+#include "fem/model_stiffness.h"
+#include "linalg/condition.h"
 #include "mesh_fixtures.h"
-#include "model/cut_select.h"
 #include "random_cuts.h"
 #include "relative_difference.h"
-#include "solid/model_stiffness.h"
-#include "solve/condition.h"
 #include "stiffness_models.h"
 #include "tests/bench/memory_columns.h"
 

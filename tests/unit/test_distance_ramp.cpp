@@ -1,14 +1,14 @@
 // Grey values by distance: planes, edges, corners, the band against a search over all triangles.
 
+#include "antialiasing/coverage.h"
+#include "antialiasing/distance_band_internal.h"
+#include "antialiasing/distance_ramp.h"
 #include "base/error.h"
 #include "larger.h"
 #include "mesh_fixtures.h"
 #include "surface/gradient_normals.h"
 #include "surface/marching_cubes.h"
 #include "volume/volume_stats.h"
-#include "voxelize/coverage.h"
-#include "voxelize/distance_band_internal.h"
-#include "voxelize/distance_ramp.h"
 
 #include <gtest/gtest.h>
 

@@ -3,11 +3,11 @@
 
 #include "dynamics/elastodynamic.h"
 #include "dynamics/solid_dynamic.h"
+#include "fem/model_stiffness.h"
 #include "larger.h"
+#include "linalg/factor.h"
 #include "random_nets.h"
 #include "sim_models.h"
-#include "solid/model_stiffness.h"
-#include "solve/factor.h"
 
 #include <cmath>
 #include <cstdio>

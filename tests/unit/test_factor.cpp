@@ -1,12 +1,12 @@
 // The factor: C = K⁻¹ to rounding, from any thread, taken apart and put together again.
 
-#include "solid/model_stiffness.h"
-#include "solve/factor.h"
+#include "fem/model_stiffness.h"
+#include "linalg/factor.h"
 
-#include "compliance/compliance_columns.h"
+#include "cholesky/fused_internal.h"
+#include "columns/compliance_columns.h"
 #include "larger.h"
-#include "solve/condition.h"
-#include "solve/fused_internal.h"
+#include "linalg/condition.h"
 #include "stiffness_models.h"
 
 #include <algorithm>

@@ -1,8 +1,8 @@
 // The dense part of a front against a plain triple loop, and solves with its numbers against plain
 // substitution, bit by bit: each entry loses its products one by one in the order of elimination.
 
-#include "solve/front_kernel_internal.h"
-#include "solve/supernodal_solve_internal.h"
+#include "cholesky/front_kernel_internal.h"
+#include "linalg/supernodal_solve_internal.h"
 #include "stiffness_models.h"
 
 #include <algorithm>

@@ -1,14 +1,14 @@
 // The factor that follows changes: equal to a fresh one, by its solutions and, with the same tree,
 // by its bits; cheap where a change is local.
 
-#include "solid/model_stiffness.h"
-#include "solve/frontal_factor.h"
+#include "fem/model_stiffness.h"
+#include "linalg/frontal_factor.h"
 
 #include "compliance/axis_solver.h"
 #include "larger.h"
+#include "linalg/factor.h"
 #include "mesh_fixtures.h"
 #include "relative_difference.h"
-#include "solve/factor.h"
 #include "stiffness_models.h"
 
 #include <Eigen/SparseCholesky>

@@ -1,13 +1,13 @@
-// Hyperelastic solids: the element by finite differences and by solid/element.h at rest, bodies by
+// Hyperelastic solids: the element by finite differences and by fem/element.h at rest, bodies by
 // analysis: uniaxial stretch, an elastica, a motion made up, order of convergence.
 
 #include "base/cpu.h"
 #include "base/error.h"
-#include "solid/assembly.h"
-#include "solid/hyperelastic.h"
-#include "solid/hyperelastic_kernel_internal.h"
-#include "solid/hyperelastic_statics.h"
-#include "solve/factor.h"
+#include "fem/assembly.h"
+#include "fem/hyperelastic.h"
+#include "fem/hyperelastic_kernel_internal.h"
+#include "fem/hyperelastic_statics.h"
+#include "linalg/factor.h"
 #include "tests/unit/larger.h"
 #include "tet_fixtures.h"
 #include "tetrahedra/boundary.h"

@@ -2,15 +2,15 @@
 // that way is chosen.
 
 #include "base/error.h"
-#include "base/mesh.h"
-#include "base/vector_at.h"
 #include "dynamics/elastodynamic.h"
 #include "dynamics/solid_dynamic.h"
+#include "geometry/mesh.h"
+#include "geometry/vector_at.h"
+#include "integrator/motion_volumes_internal.h"
 #include "larger.h"
 #include "random_nets.h"
 #include "scene/simulation.h"
 #include "sim_models.h"
-#include "solid/motion_volumes_internal.h"
 
 #include <algorithm>
 #include <cmath>

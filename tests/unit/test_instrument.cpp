@@ -1,8 +1,8 @@
 #include "contact/instrument.h"
 
-#include "base/vector_at.h"
 #include "contact/instrument_surface.h"
 #include "contact/load.h"
+#include "geometry/vector_at.h"
 #include "larger.h"
 #include "sim_models.h"
 

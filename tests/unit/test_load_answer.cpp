@@ -1,11 +1,11 @@
 // Caches of lib/compliance: answers to consecutive loads, and columns of the compliance matrix.
 
-#include "compliance/column_cache.h"
+#include "columns/column_cache.h"
 #include "compliance/compliance.h"
 #include "compliance/load_answer.h"
-#include "cutting/cut_stiffness.h"
 #include "larger.h"
 #include "sim_models.h"
+#include "update/cut_stiffness.h"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "base/logarithm.h"
+#include "numeric/logarithm.h"
 
 #include "larger.h"
 

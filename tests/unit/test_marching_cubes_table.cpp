@@ -1,6 +1,6 @@
 // The table of marching cubes, over all 256 cases.
 
-#include "base/vec3.h"
+#include "geometry/vec3.h"
 #include "surface/marching_cubes_table.h"
 #include "tests/unit/larger.h"
 

@@ -3,7 +3,7 @@
 #include "base/error.h"
 #include "base/memory_account.h"
 #include "tests/unit/sanitizers.h"
-#include "tools/shared/memory_limit.h"
+#include "tools/cli/memory_limit.h"
 
 #include <gtest/gtest.h>
 

@@ -2,7 +2,7 @@
 // judged by other means than those that found them.
 
 #include "base/error.h"
-#include "base/vector_at.h"
+#include "geometry/vector_at.h"
 #include "scene/simulation.h"
 #include "sim_models.h"
 #include "simulation_scenes.h"

@@ -1,15 +1,15 @@
 // K of a solid by its nodes: that of the elements, before and after cuts, and its factor, which
 // follows them.
 
-#include "cutting/cut_stiffness.h"
+#include "cutting/cut.h"
+#include "cutting/cut_solid.h"
+#include "fem/model_stiffness.h"
+#include "fem/solid_model.h"
 #include "larger.h"
-#include "model/cut.h"
-#include "solid/cut_solid.h"
-#include "solid/model_stiffness.h"
-#include "solid/node_stiffness.h"
-#include "solid/solid_model.h"
-#include "solve/factor.h"
+#include "linalg/factor.h"
 #include "tet_fixtures.h"
+#include "update/cut_stiffness.h"
+#include "update/node_stiffness.h"
 
 #include <gtest/gtest.h>
 

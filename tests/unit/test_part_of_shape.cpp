@@ -1,15 +1,15 @@
 // Shapes that instruments look at in part, as nobody else asks for them.
 
 #include "base/error.h"
-#include "base/vector_at.h"
-#include "compliance/column_compression.h"
-#include "compliance/compliance_columns.h"
+#include "columns/column_compression.h"
+#include "columns/compliance_columns.h"
 #include "compliance/compliance_source.h"
+#include "fem/model_stiffness.h"
+#include "geometry/vector_at.h"
+#include "linalg/condition.h"
+#include "linalg/factor.h"
 #include "scene/simulation.h"
 #include "sim_models.h"
-#include "solid/model_stiffness.h"
-#include "solve/condition.h"
-#include "solve/factor.h"
 #include "statics/elastostatic.h"
 #include "stiffness_models.h"
 

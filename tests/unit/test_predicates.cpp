@@ -1,6 +1,6 @@
 // The exact predicates against rational arithmetic.
 
-#include "base/exact_predicates.h"
+#include "geometry/exact_predicates.h"
 
 #include <gmpxx.h>
 #include <gtest/gtest.h>

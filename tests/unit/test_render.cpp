@@ -8,11 +8,11 @@
 #include "shading/angles.h"
 #include "shading/camera.h"
 #include "shading/drawing.h"
-#include "shading/image.h"
 #include "shading/style.h"
 #include "shading/tangents.h"
-#include "shading/texture.h"
 #include "shading/uv.h"
+#include "texture/image.h"
+#include "texture/texture.h"
 
 #include <gtest/gtest.h>
 

@@ -10,9 +10,9 @@
 #include "render/picture.h"
 #include "render_oracle.h"
 #include "render_scenes.h"
-#include "shading/rest.h"
 #include "shading/tangents.h"
 #include "shading/uv.h"
+#include "texture/rest.h"
 
 #include <gtest/gtest.h>
 

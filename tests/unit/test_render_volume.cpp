@@ -5,8 +5,8 @@
 #include "formats/volume/volume_plugin.h"
 #include "larger.h"
 #include "scratch.h"
-#include "shading/color_ramp.h"
 #include "shading/volume_view.h"
+#include "texture/color_ramp.h"
 #include "volume/field.h"
 
 #include <gtest/gtest.h>

@@ -1,9 +1,9 @@
-#include "mesh/repair.h"
+#include "repair/repair.h"
 
 #include "base/error.h"
 #include "mesh/check.h"
-#include "mesh/weld.h"
 #include "mesh_fixtures.h"
+#include "repair/weld.h"
 #include "tests/unit/sanitizers.h"
 
 #include <gtest/gtest.h>

@@ -2,12 +2,12 @@
 // a measured one; work of forces taken back, forces of displaced nodes.
 
 #include "base/error.h"
-#include "solid/assembly.h"
-#include "solid/hyperelastic_statics.h"
-#include "solid/rotation_strain.h"
-#include "solid/rotation_warp.h"
-#include "solid/warp_kernel_internal.h"
-#include "solve/factor.h"
+#include "fem/assembly.h"
+#include "fem/hyperelastic_statics.h"
+#include "linalg/factor.h"
+#include "statics/rotation_strain.h"
+#include "statics/rotation_warp.h"
+#include "statics/warp_kernel_internal.h"
 #include "tests/unit/larger.h"
 #include "tet_fixtures.h"
 #include "tetrahedra/boundary.h"

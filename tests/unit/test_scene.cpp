@@ -4,8 +4,8 @@
 #include "scratch.h"
 #include "sim_models.h"
 #include "tests/unit/complaint.h"
-#include "tools/run/scene_lines.h"
 #include "tools/run/scene_run.h"
+#include "tools/serve/scene_lines.h"
 
 #include <fstream>
 #include <gtest/gtest.h>

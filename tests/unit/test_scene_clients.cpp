@@ -2,8 +2,8 @@
 
 #include "scratch.h"
 #include "sim_models.h"
-#include "tools/run/scene_clients.h"
 #include "tools/run/scene_run.h"
+#include "tools/serve/scene_clients.h"
 
 #include <gtest/gtest.h>
 

@@ -10,10 +10,10 @@
 #include "tests/unit/sanitizers.h"
 #include "tools/run/event_log.h"
 #include "tools/run/run_report.h"
-#include "tools/run/scene_lines.h"
 #include "tools/run/scene_record.h"
 #include "tools/run/scene_run.h"
 #include "tools/run/step_latency.h"
+#include "tools/serve/scene_lines.h"
 
 #include <algorithm>
 #include <cstring>

@@ -1,11 +1,11 @@
 // Solids whose nodes are anywhere find back: those that stay inside out by one rule alone, and one
 // that an instrument presses on meanwhile.
 
-#include "base/vector_at.h"
+#include "fem/solid_model.h"
+#include "geometry/vector_at.h"
+#include "integrator/solid_motion.h"
 #include "scene/simulation.h"
 #include "simulation_scenes.h"
-#include "solid/solid_model.h"
-#include "solid/solid_motion.h"
 #include "tests/stress/motion_bodies.h"
 #include "tests/unit/larger.h"
 #include "tests/unit/tet_fixtures.h"

@@ -1,15 +1,15 @@
 // A second load on a used object gives the same result as that load on a fresh object, for every
 // pair of load kinds and every material law and method.
 
-#include "compliance/compliance_columns.h"
+#include "columns/compliance_columns.h"
+#include "fem/model_stiffness.h"
+#include "fem/solid_model.h"
 #include "larger.h"
+#include "linalg/condition.h"
+#include "linalg/factor.h"
 #include "scene/simulation.h"
 #include "sim_models.h"
 #include "simulation_scenes.h"
-#include "solid/model_stiffness.h"
-#include "solid/solid_model.h"
-#include "solve/condition.h"
-#include "solve/factor.h"
 #include "tet_fixtures.h"
 
 #include <gtest/gtest.h>

@@ -3,9 +3,9 @@
 
 #include "base/error.h"
 #include "cut_bars.h"
+#include "cutting/cut_solid.h"
+#include "cutting/skin_parts.h"
 #include "larger.h"
-#include "solid/cut_solid.h"
-#include "solid/skin_parts.h"
 
 #include <gtest/gtest.h>
 

@@ -3,10 +3,10 @@
 
 #include "base/error.h"
 #include "cut_bars.h"
+#include "fem/solid_model.h"
 #include "larger.h"
 #include "mesh/check.h"
 #include "simulation_scenes.h"
-#include "solid/solid_model.h"
 #include "tet_fixtures.h"
 
 #include <gtest/gtest.h>

@@ -1,7 +1,7 @@
 // Blocks that are thrown at a wall, by up to many times their own length within a step: none gets
 // beyond it, none leaves it with more than it had.
 
-#include "base/vector_at.h"
+#include "geometry/vector_at.h"
 #include "larger.h"
 #include "scene/simulation.h"
 #include "sim_models.h"

@@ -3,12 +3,12 @@
 
 #include "base/context.h"
 #include "base/error.h"
-#include "base/vector_at.h"
+#include "fem/solid_model.h"
+#include "geometry/vector_at.h"
 #include "larger.h"
 #include "scene/simulation.h"
 #include "sim_models.h"
 #include "simulation_scenes.h"
-#include "solid/solid_model.h"
 #include "tet_fixtures.h"
 #include "touching_blocks.h"
 

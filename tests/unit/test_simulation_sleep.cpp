@@ -1,10 +1,10 @@
 // What rests costs nothing, however much else moves in its scene: counted, not timed.
 
-#include "base/vector_at.h"
+#include "fem/solid_model.h"
+#include "geometry/vector_at.h"
 #include "scene/simulation.h"
 #include "sim_models.h"
 #include "simulation_scenes.h"
-#include "solid/solid_model.h"
 #include "tet_fixtures.h"
 
 #include <gtest/gtest.h>

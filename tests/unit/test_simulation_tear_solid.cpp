@@ -3,12 +3,12 @@
 #include "base/error.h"
 #include "contact_checks.h"
 #include "cut_bars.h"
+#include "cutting/tear_solid.h"
+#include "fem/assembly.h"
+#include "fem/solid_model.h"
 #include "larger.h"
 #include "mesh/check.h"
 #include "simulation_scenes.h"
-#include "solid/assembly.h"
-#include "solid/solid_model.h"
-#include "solid/tear_solid.h"
 #include "tet_fixtures.h"
 
 #include <gtest/gtest.h>

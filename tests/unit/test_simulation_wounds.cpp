@@ -1,14 +1,14 @@
 // Scenes in which the walls of wounds touch: instruments, each other, what lies around.
 
 #include "base/error.h"
-#include "base/vector_at.h"
 #include "contact/convex_core.h"
 #include "contact_checks.h"
 #include "convex_meshes.h"
 #include "cut_bars.h"
+#include "fem/solid_model.h"
+#include "geometry/vector_at.h"
 #include "larger.h"
 #include "simulation_scenes.h"
-#include "solid/solid_model.h"
 #include "tet_fixtures.h"
 #include "touching_blocks.h"
 

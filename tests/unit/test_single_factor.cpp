@@ -1,8 +1,8 @@
 // The factor with entries of 16 bits against the factor.
 
-#include "solid/assembly.h"
-#include "solve/factor.h"
-#include "solve/single_factor.h"
+#include "fem/assembly.h"
+#include "linalg/factor.h"
+#include "linalg/single_factor.h"
 #include "tests/unit/larger.h"
 #include "tet_fixtures.h"
 

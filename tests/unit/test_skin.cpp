@@ -1,11 +1,11 @@
 // Surfaces that follow the elements of a solid: which element, how, in files.
 
 #include "base/error.h"
+#include "embedding/skin.h"
+#include "fem/solid_model.h"
 #include "formats/model/ela.h"
 #include "mesh/nearest_point.h"
 #include "model_meshes.h"
-#include "solid/skin.h"
-#include "solid/solid_model.h"
 #include "tests/unit/complaint.h"
 #include "tests/unit/larger.h"
 #include "tet_fixtures.h"

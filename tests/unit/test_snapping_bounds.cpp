@@ -1,12 +1,12 @@
 // What snapping at epsilon 0.5 costs in error and gives in quality, as the manual promises.
 
+#include "antialiasing/coverage.h"
 #include "formats/mesh/mesh_file.h"
 #include "mesh/quality.h"
 #include "mesh/self_intersections.h"
 #include "tests/unit/mesh_fixtures.h"
 #include "tests/unit/surface_scenes.h"
 #include "volume/lattice.h"
-#include "voxelize/coverage.h"
 
 #include <gtest/gtest.h>
 

@@ -2,7 +2,7 @@
 // distorted meshes, other frames.
 
 #include "base/error.h"
-#include "solid/element.h"
+#include "fem/element.h"
 #include "tet_fixtures.h"
 
 #include <Eigen/Dense>

@@ -2,10 +2,10 @@
 // beside it, any number of threads.
 
 #include "base/error.h"
-#include "solid/assembly.h"
-#include "solid/model_stiffness.h"
-#include "solid/stress.h"
-#include "solve/factor.h"
+#include "fem/assembly.h"
+#include "fem/model_stiffness.h"
+#include "fem/stress.h"
+#include "linalg/factor.h"
 #include "tests/unit/larger.h"
 #include "tests/unit/solid_bodies.h"
 #include "tet_fixtures.h"

@@ -1,11 +1,11 @@
 // Solids in motion: what mechanics says of them (energy, momentum, rest, order), that they find
 // back from any shape, and a measured beam's frequency.
 
-#include "solid/hyperelastic_statics.h"
-#include "solid/motion_limit_internal.h"
-#include "solid/motion_volumes_internal.h"
-#include "solid/solid_motion.h"
-#include "solve/factor.h"
+#include "fem/hyperelastic_statics.h"
+#include "integrator/motion_limit_internal.h"
+#include "integrator/motion_volumes_internal.h"
+#include "integrator/solid_motion.h"
+#include "linalg/factor.h"
 #include "tests/stress/motion_bodies.h"
 #include "tests/unit/larger.h"
 #include "tests/unit/relative_difference.h"

@@ -1,12 +1,12 @@
 // Springs beside elements in motion: ties between solids, and nets that hang on them.
 
 #include "base/error.h"
-#include "base/vector_at.h"
+#include "fem/solid_model.h"
+#include "geometry/vector_at.h"
+#include "integrator/solid_motion.h"
 #include "scene/simulation.h"
 #include "sim_models.h"
 #include "simulation_scenes.h"
-#include "solid/solid_model.h"
-#include "solid/solid_motion.h"
 #include "tests/unit/larger.h"
 #include "tet_fixtures.h"
 

@@ -1,6 +1,6 @@
 // Solids against answers from elsewhere: order of convergence, beams, Cook's membrane, NAFEMS LE10.
 
-#include "solid/assembly.h"
+#include "fem/assembly.h"
 #include "tests/unit/solid_bodies.h"
 
 #include <gtest/gtest.h>

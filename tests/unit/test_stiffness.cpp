@@ -1,7 +1,7 @@
 // K, and what follows from it: symmetry, springs' forces, reactions.
 
-#include "solid/model_stiffness.h"
-#include "solve/stiffness.h"
+#include "fem/model_stiffness.h"
+#include "linalg/stiffness.h"
 
 #include "base/digest.h"
 #include "larger.h"

@@ -1,17 +1,17 @@
 // What a cut changes: against matrices, factors and columns made afresh.
 
-#include "cutting/stiffness_change.h"
+#include "update/stiffness_change.h"
 
-#include "compliance/compliance_columns.h"
+#include "columns/compliance_columns.h"
 #include "cut_models.h"
-#include "cutting/corrected_columns.h"
-#include "cutting/woodbury.h"
+#include "fem/model_stiffness.h"
 #include "larger.h"
+#include "linalg/condition.h"
 #include "made_columns.h"
 #include "relative_difference.h"
-#include "solid/model_stiffness.h"
-#include "solve/condition.h"
 #include "stiffness_models.h"
+#include "update/corrected_columns.h"
+#include "update/woodbury.h"
 
 #include <gtest/gtest.h>
 

@@ -3,15 +3,15 @@
 #include "formats/store/stiffness_store.h"
 
 #include "base/crc32c.h"
-#include "compliance/column_compression.h"
-#include "compliance/compliance_columns.h"
+#include "columns/column_compression.h"
+#include "columns/compliance_columns.h"
+#include "fem/model_stiffness.h"
 #include "formats/store/hdf5_internal.h"
 #include "formats/store/stiffness_store_writer.h"
 #include "formats/stream/raw_file_internal.h"
 #include "larger.h"
+#include "linalg/condition.h"
 #include "scratch.h"
-#include "solid/model_stiffness.h"
-#include "solve/condition.h"
 #include "stiffness_models.h"
 
 #include <algorithm>

@@ -1,6 +1,6 @@
 // Quantiles of Student's t distribution against closed forms and tables.
 
-#include "base/student_t.h"
+#include "numeric/student_t.h"
 
 #include <gtest/gtest.h>
 

@@ -3,13 +3,13 @@
 
 #include "base/error.h"
 #include "compliance/compliance_source.h"
+#include "fem/assembly.h"
+#include "fem/model_stiffness.h"
+#include "fem/solid_model.h"
 #include "larger.h"
+#include "linalg/stiffness.h"
 #include "scene/support.h"
 #include "simulation_scenes.h"
-#include "solid/assembly.h"
-#include "solid/model_stiffness.h"
-#include "solid/solid_model.h"
-#include "solve/stiffness.h"
 
 #include <algorithm>
 #include <cmath>

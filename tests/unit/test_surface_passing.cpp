@@ -1,12 +1,12 @@
 // Bodies that would pass each other within a step are kept from it.
 
 #include "base/context.h"
-#include "base/vector_at.h"
+#include "fem/solid_model.h"
+#include "geometry/vector_at.h"
 #include "larger.h"
 #include "scene/simulation.h"
 #include "sim_models.h"
 #include "simulation_scenes.h"
-#include "solid/solid_model.h"
 #include "tet_fixtures.h"
 
 #include <gtest/gtest.h>

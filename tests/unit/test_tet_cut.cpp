@@ -2,6 +2,9 @@
 // planes (tetrahedra/clip.h, other code) say what comes out.
 
 #include "base/disjoint_sets.h"
+#include "incision/cut_blade_internal.h"
+#include "incision/cut_link_internal.h"
+#include "incision/cut_split_internal.h"
 #include "stuffing/stuffing.h"
 #include "surface_scenes.h"
 #include "tests/unit/complaint.h"
@@ -9,9 +12,6 @@
 #include "tet_fixtures.h"
 #include "tetrahedra/clip.h"
 #include "tetrahedra/components.h"
-#include "tetrahedra/cut_blade_internal.h"
-#include "tetrahedra/cut_link_internal.h"
-#include "tetrahedra/cut_split_internal.h"
 #include "tetrahedra/order.h"
 
 #include <gtest/gtest.h>

@@ -1,4 +1,4 @@
-#include "shading/tissue_color.h"
+#include "texture/tissue_color.h"
 
 #include <gtest/gtest.h>
 

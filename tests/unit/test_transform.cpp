@@ -1,11 +1,11 @@
 // Affine maps, anatomical spaces, and --transform of meshes, tetrahedra and models.
 
-#include "base/affine.h"
 #include "base/error.h"
-#include "base/space.h"
 #include "formats/model/ela.h"
+#include "geometry/affine.h"
+#include "geometry/space.h"
 #include "tests/unit/complaint.h"
-#include "tools/shared/transform_option.h"
+#include "tools/cli/transform_option.h"
 
 #include <gtest/gtest.h>
 

@@ -1,9 +1,9 @@
 #include "base/error.h"
+#include "fem/model_stiffness.h"
 #include "larger.h"
 #include "scene/simulation.h"
 #include "sim_models.h"
 #include "simulation_scenes.h"
-#include "solid/model_stiffness.h"
 #include "statics/two_step.h"
 
 #include "compliance/compliance_source.h"

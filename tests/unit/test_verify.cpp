@@ -1,11 +1,11 @@
 // The second opinion: it agrees with what is right and finds what is wrong.
 
-#include "compliance/verify.h"
+#include "columns/verify.h"
 
-#include "compliance/compliance_columns.h"
+#include "columns/compliance_columns.h"
+#include "fem/model_stiffness.h"
 #include "larger.h"
-#include "solid/model_stiffness.h"
-#include "solve/condition.h"
+#include "linalg/condition.h"
 #include "stiffness_models.h"
 
 #include <gtest/gtest.h>

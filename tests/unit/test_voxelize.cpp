@@ -4,7 +4,7 @@
 #include "mesh/border.h"
 #include "mesh_fixtures.h"
 #include "volume/lattice.h"
-#include "voxelize/voxelize.h"
+#include "voxelization/voxelize.h"
 
 #include <gtest/gtest.h>
 

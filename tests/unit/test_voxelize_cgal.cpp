@@ -3,7 +3,7 @@
 #include "base/error.h"
 #include "cgal_side.h"
 #include "volume/lattice.h"
-#include "voxelize/ray_crossings_internal.h"
+#include "voxelization/ray_crossings.h"
 
 #include <gtest/gtest.h>
 

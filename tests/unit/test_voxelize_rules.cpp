@@ -1,13 +1,13 @@
 // The rules winding and zbuffer against brute-force statements of them.
 
 #include "base/error.h"
-#include "base/exact_predicates.h"
-#include "mesh/oriented_surface.h"
+#include "geometry/exact_predicates.h"
 #include "mesh_fixtures.h"
+#include "repair/oriented_surface.h"
 #include "tests/unit/larger.h"
 #include "volume/lattice.h"
-#include "voxelize/solid_angle_tree_internal.h"
-#include "voxelize/voxelize.h"
+#include "voxelization/solid_angle_tree_internal.h"
+#include "voxelization/voxelize.h"
 
 #include <gtest/gtest.h>
 

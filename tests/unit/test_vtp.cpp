@@ -1,10 +1,10 @@
 // Surfaces of VTK: read however they are stored, refused where they are broken.
 
 #include "base/error.h"
-#include "base/mesh.h"
 #include "formats/mesh/mesh_file.h"
 #include "formats/mesh/vtp.h"
 #include "formats/stream/kind.h"
+#include "geometry/mesh.h"
 #include "tests/unit/complaint.h"
 #include "vtk_writer.h"
 

@@ -1,7 +1,7 @@
 #include "base/error.h"
-#include "base/mesh.h"
+#include "geometry/mesh.h"
 #include "mesh/triangulate.h"
-#include "mesh/weld.h"
+#include "repair/weld.h"
 #include "tests/unit/complaint.h"
 
 #include <gtest/gtest.h>

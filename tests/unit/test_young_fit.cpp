@@ -1,8 +1,8 @@
 // Young's moduli from measured displacements, damping from a measured swing.
 
-#include "solid/solid_place.h"
-#include "solid/swing_fit.h"
-#include "solid/young_fit.h"
+#include "embedding/solid_place.h"
+#include "fit/swing_fit.h"
+#include "fit/young_fit.h"
 #include "tests/unit/solid_bodies.h"
 
 #include <Eigen/Dense>

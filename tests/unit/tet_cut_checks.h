@@ -1,9 +1,9 @@
 #pragma once
 // What must hold of every solid that a blade has cut, by code that knows nothing of how it is done.
 
+#include "incision/cut_tetrahedra.h"
 #include "larger.h"
 #include "tetrahedra/check.h"
-#include "tetrahedra/cut_tetrahedra.h"
 #include "tetrahedra/quality.h"
 
 #include <algorithm>

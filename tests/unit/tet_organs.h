@@ -3,7 +3,7 @@
 
 #include "mesh_fixtures.h"
 #include "stuffing/stuffing.h"
-#include "voxelize/voxelize.h"
+#include "voxelization/voxelize.h"
 
 #include <string>
 

@@ -1,12 +1,12 @@
 #pragma once
 // Soft blocks whose surfaces touch in scenes, and what tests ask of them.
 
-#include "base/vector_at.h"
 #include "contact_checks.h"
+#include "fem/solid_model.h"
+#include "geometry/vector_at.h"
 #include "larger.h"
 #include "scene/simulation.h"
 #include "simulation_scenes.h"
-#include "solid/solid_model.h"
 #include "tet_fixtures.h"
 
 #include <algorithm>

@@ -2,7 +2,8 @@
 // Organs that are pressed together, and tubes that are folded, as solids and as nets; and what came
 // of it, from what scenes tell.
 
-#include "base/vector_at.h"
+#include "fem/solid_model.h"
+#include "geometry/vector_at.h"
 #include "larger.h"
 #include "mesh_fixtures.h"
 #include "model/build.h"
@@ -10,7 +11,6 @@
 #include "scene/simulation.h"
 #include "sim_models.h"
 #include "simulation_scenes.h"
-#include "solid/solid_model.h"
 #include "stuffing/stuffing.h"
 #include "tet_organs.h"
 #include "touching_blocks.h"

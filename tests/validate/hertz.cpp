@@ -1,7 +1,7 @@
 // Contact against theory: a rigid ball pressed into a block (Hertz 1881).
 
 #include "contact/instrument.h"
-#include "solid/solid_model.h"
+#include "fem/solid_model.h"
 #include "statics/elastostatic.h"
 #include "tests/bench/timing.h"
 #include "tests/validate/checks.h"

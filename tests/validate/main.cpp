@@ -1,4 +1,4 @@
-// The finite elements of lib/solid, and contact with instruments, against theory, benchmarks,
+// The finite elements of lib/fem, and contact with instruments, against theory, benchmarks,
 // another program and an experiment.
 //
 // Prints its checks, writes a page with curves into FOLDER, and ends with status 1 where a bound is

@@ -1,11 +1,11 @@
 #include "tests/validate/organs.h"
 
+#include "antialiasing/distance_ramp.h"
 #include "stuffing/stuffing.h"
 #include "tests/unit/mesh_fixtures.h"
 #include "tests/validate/peers.h"
 #include "tetrahedra/components.h"
 #include "tetrahedra/order.h"
-#include "voxelize/distance_ramp.h"
 
 #include <algorithm>
 #include <array>

@@ -3,7 +3,7 @@
 
 #include "tests/validate/checks.h"
 
-#include "base/mesh.h"
+#include "geometry/mesh.h"
 #include "volume/grid.h"
 
 #include <string>

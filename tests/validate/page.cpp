@@ -195,7 +195,7 @@ void write_page(const std::string& folder, const std::vector<Section>& sections)
   std::ostringstream page;
   page
       << "# Do the finite elements compute what is right?\n\n"
-         "`make validate` wrote this page. It compares the finite elements of `lib/solid` with "
+         "`make validate` wrote this page. It compares the finite elements of `lib/fem` with "
          "theory, benchmarks, another program and an experiment. Each line has a bound; the "
          "command fails if one is exceeded. Times are processor times of assembly, factorisation "
          "and solution on one thread; memory is that of the factor. Curves show error over time.\n";

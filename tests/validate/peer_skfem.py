@@ -7,7 +7,7 @@ FOLDER holds the case as raw arrays (tests/validate/peers.cpp writes them) and t
 all axes, its lower triangle by columns: column_start.i64, row.i64, value.f64; with `stress` also stress.f64, xx xy xz yy yz zz at a
 corner: the mean of its elements, each by its own displacements there. Prints unknowns, ms of the processor for assembly,
 factor and solve, and 1 if the factor is CHOLMOD's. Elements: linear; plain quadratic; quadratic with a bubble and discontinuous
-linear pressure, pressure and bubble condensed (lib/solid/element.h), built here from their weak form.
+linear pressure, pressure and bubble condensed (lib/fem/element.h), built here from their weak form.
 """
 import os
 import sys

@@ -1,9 +1,9 @@
 // Instruments slid over a net and over solids: their forces are continuous, push, and brake.
 
-#include "base/vector_at.h"
 #include "contact/instrument.h"
+#include "fem/solid_model.h"
+#include "geometry/vector_at.h"
 #include "model/build.h"
-#include "solid/solid_model.h"
 #include "statics/elastostatic.h"
 #include "stuffing/stuffing.h"
 #include "tests/bench/timing.h"

@@ -1,7 +1,7 @@
 // Against an experiment in time: a silicone beam that is let go and swings.
 
-#include "solid/solid_motion.h"
-#include "solid/swing_fit.h"
+#include "fit/swing_fit.h"
+#include "integrator/solid_motion.h"
 #include "tests/bench/timing.h"
 #include "tests/unit/mesh_fixtures.h"
 #include "tests/validate/checks.h"
@@ -161,7 +161,7 @@ Section swings() {
       "little themselves; the damping ratio is " +
           text_of(ratio) +
           " for both loads, less the share of the steps. Frequency and rest position come from a "
-          "decaying oscillation fitted to each path (`lib/solid/swing_fit.h`); measured ones are "
+          "decaying oscillation fitted to each path (`lib/fit/swing_fit.h`); measured ones are "
           "the mean of two trials. Decay compares the distances between turning points, relative "
           "to the first, over six swings. The release by hand is slower than in the simulation, "
           "so measured swings begin smaller. Times count from a droop of 1 mm. "

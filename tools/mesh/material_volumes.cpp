@@ -3,7 +3,7 @@
 #include "base/error.h"
 #include "formats/volume/volume_file.h"
 #include "stuffing/materials.h"
-#include "tools/shared/voxelize_labels.h"
+#include "tools/volume/voxelize_labels.h"
 
 #include <cstdint>
 #include <string>

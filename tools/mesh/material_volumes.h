@@ -1,13 +1,13 @@
 #pragma once
 // The volumes that tell where the materials of a solid are.
 
-#include "base/space.h"
 #include "formats/stream/stream.h"
 #include "formats/volume/label_volume.h"
+#include "geometry/space.h"
 #include "labels/label_runs.h"
 #include "stuffing/stuffing.h"
+#include "tools/cli/cli.h"
 #include "tools/mesh/mesh_arguments.h"
-#include "tools/shared/cli.h"
 #include "volume/grid.h"
 
 #include <vector>

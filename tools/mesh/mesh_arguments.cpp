@@ -3,9 +3,9 @@
 #include "base/error.h"
 #include "formats/mesh/mesh_file.h"
 #include "formats/tetrahedra/tet_file.h"
-#include "tools/shared/cli.h"
-#include "tools/shared/surface_choice.h"
-#include "tools/shared/voxelize_labels.h"
+#include "tools/cli/cli.h"
+#include "tools/mesh/surface_choice.h"
+#include "tools/volume/voxelize_labels.h"
 
 #include <algorithm>
 

@@ -8,9 +8,9 @@
 #include "tools/mesh/material_volumes.h"
 #include "tools/mesh/mesh_work.h"
 #include "tools/mesh/prepared_volume.h"
-#include "tools/shared/surface_choice.h"
-#include "tools/shared/tet_report.h"
-#include "tools/shared/topology_change.h"
+#include "tools/mesh/surface_choice.h"
+#include "tools/mesh/tet_report.h"
+#include "tools/volume/topology_change.h"
 
 #include <cstdint>
 #include <string>

@@ -5,9 +5,9 @@
 #include "surface/snapping.h"
 #include "tools/mesh/mesh_work.h"
 #include "tools/mesh/prepared_volume.h"
-#include "tools/shared/surface_choice.h"
-#include "tools/shared/surface_report.h"
-#include "tools/shared/topology_change.h"
+#include "tools/mesh/surface_choice.h"
+#include "tools/mesh/surface_report.h"
+#include "tools/volume/topology_change.h"
 
 #include <string>
 

@@ -1,8 +1,8 @@
 #pragma once
 // What mc-opt does.
 
+#include "tools/cli/cli.h"
 #include "tools/mesh/mesh_arguments.h"
-#include "tools/shared/cli.h"
 
 namespace gewebe {
 

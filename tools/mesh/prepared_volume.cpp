@@ -2,9 +2,9 @@
 
 #include "formats/volume/volume_file.h"
 #include "surface/marching_cubes.h"
-#include "tools/shared/distrust.h"
-#include "tools/shared/space_option.h"
-#include "tools/shared/surface_choice.h"
+#include "tools/cli/distrust.h"
+#include "tools/cli/space_option.h"
+#include "tools/mesh/surface_choice.h"
 #include "volume/crop.h"
 #include "volume/resample.h"
 

@@ -1,11 +1,11 @@
 #pragma once
 // The volume that mc-opt meshes, and reports about its surface.
 
-#include "base/space.h"
 #include "formats/stream/stream.h"
+#include "geometry/space.h"
 #include "mesh/components.h"
+#include "tools/cli/cli.h"
 #include "tools/mesh/mesh_arguments.h"
-#include "tools/shared/cli.h"
 #include "volume/grid.h"
 
 #include <array>

@@ -1,6 +1,6 @@
 #include "tools/render/render_arguments.h"
 
-#include "shading/color_ramp.h"
+#include "texture/color_ramp.h"
 #include "tools/render/render_camera.h"
 #include "tools/render/render_field.h"
 #include "tools/render/render_layer.h"

@@ -4,11 +4,11 @@
 #include "render/picture.h"
 #include "shading/camera.h"
 #include "shading/drawing.h"
-#include "shading/surface_material.h"
 #include "shading/uv.h"
 #include "shading/volume_view.h"
+#include "texture/surface_material.h"
+#include "tools/cli/cli.h"
 #include "tools/render/surface_file.h"
-#include "tools/shared/cli.h"
 
 #include <array>
 #include <cstdint>

@@ -2,8 +2,8 @@
 // emboss-render --field: values of a result in the colours of a ramp.
 
 #include "formats/stream/stream.h"
+#include "tools/cli/cli.h"
 #include "tools/render/render_arguments.h"
-#include "tools/shared/cli.h"
 
 #include <cstdint>
 #include <vector>

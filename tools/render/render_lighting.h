@@ -3,9 +3,9 @@
 // endoscope.
 
 #include "shading/drawing.h"
-#include "shading/surface_material.h"
+#include "texture/surface_material.h"
+#include "tools/cli/cli.h"
 #include "tools/render/render_arguments.h"
-#include "tools/shared/cli.h"
 
 namespace gewebe::cli {
 

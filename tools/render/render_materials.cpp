@@ -1,7 +1,7 @@
 #include "tools/render/render_materials.h"
 
 #include "formats/results/results.h"
-#include "shading/tissue_color.h"
+#include "texture/tissue_color.h"
 #include "tools/render/render_layer.h"
 #include "tools/render/render_lighting.h"
 

@@ -2,10 +2,10 @@
 // Draws the pictures of surfaces that emboss-render's options request.
 
 #include "render/picture.h"
-#include "shading/image.h"
+#include "texture/image.h"
+#include "tools/cli/cli.h"
 #include "tools/render/render_arguments.h"
 #include "tools/render/render_materials.h"
-#include "tools/shared/cli.h"
 
 #include <array>
 #include <cstdint>

@@ -3,8 +3,8 @@
 #include "formats/image/image_file.h"
 #include "formats/volume/volume_plugin.h"
 #include "raster/raster_cpu.h"
-#include "shading/color_ramp.h"
-#include "shading/surface_material.h"
+#include "texture/color_ramp.h"
+#include "texture/surface_material.h"
 
 #include <algorithm>
 #include <charconv>

@@ -3,10 +3,10 @@
 
 #include "formats/stream/kind.h"
 #include "formats/stream/stream.h"
-#include "shading/color_ramp.h"
-#include "shading/image.h"
+#include "texture/color_ramp.h"
+#include "texture/image.h"
+#include "tools/cli/cli.h"
 #include "tools/render/render_arguments.h"
-#include "tools/shared/cli.h"
 
 namespace gewebe::cli {
 

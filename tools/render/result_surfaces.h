@@ -3,9 +3,9 @@
 // of a field as texture coordinates of a ramp.
 
 #include "formats/stream/stream.h"
-#include "shading/color_ramp.h"
 #include "shading/drawing.h"
-#include "shading/texture.h"
+#include "texture/color_ramp.h"
+#include "texture/texture.h"
 #include "tools/render/surface_file.h"
 
 #include <array>

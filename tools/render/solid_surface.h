@@ -5,8 +5,8 @@
 #include "formats/stream/stream.h"
 #include "shading/drawing.h"
 #include "tetrahedra/clip.h"
+#include "tools/cli/cli.h"
 #include "tools/render/surface_file.h"
-#include "tools/shared/cli.h"
 
 namespace gewebe {
 

@@ -1,11 +1,11 @@
 #include "tools/render/surface_file.h"
 
 #include "base/error.h"
+#include "fem/solid_model.h"
 #include "formats/mesh/mesh_file.h"
 #include "formats/model/ela.h"
 #include "formats/results/results.h"
 #include "formats/tetrahedra/tet_file.h"
-#include "solid/solid_model.h"
 #include "tetrahedra/order.h"
 #include "tools/render/result_surfaces.h"
 #include "tools/render/solid_surface.h"

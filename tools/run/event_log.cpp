@@ -1,6 +1,6 @@
 #include "tools/run/event_log.h"
 
-#include "base/number_text.h"
+#include "text/number_text.h"
 
 #include <initializer_list>
 

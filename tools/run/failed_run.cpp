@@ -1,8 +1,8 @@
 #include "tools/run/failed_run.h"
 
-#include "base/number_text.h"
 #include "formats/stream/removal.h"
-#include "tools/shared/progress_bar.h"
+#include "text/number_text.h"
+#include "tools/cli/progress_bar.h"
 
 #include <csignal>
 #include <string>

@@ -3,10 +3,10 @@
 
 #include "base/error.h"
 #include "formats/results/results_writer.h"
+#include "tools/cli/cli.h"
 #include "tools/run/event_log.h"
 #include "tools/run/scene_record.h"
 #include "tools/run/step_latency.h"
-#include "tools/shared/cli.h"
 
 #include <optional>
 

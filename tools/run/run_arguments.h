@@ -1,8 +1,8 @@
 #pragma once
 // What the command line of ffe-run says.
 
-#include "tools/run/result_choice.h"
-#include "tools/shared/cli.h"
+#include "tools/cli/cli.h"
+#include "tools/results/result_choice.h"
 
 #include <optional>
 #include <string>

@@ -1,8 +1,8 @@
 #include "tools/run/run_report.h"
 
 #include "base/error.h"
-#include "base/number_text.h"
 #include "statics/warped_statics.h"
+#include "text/number_text.h"
 
 #include <cmath>
 #include <cstdint>

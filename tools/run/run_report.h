@@ -1,9 +1,9 @@
 #pragma once
 // Report of ffe-run about a scene.
 
+#include "tools/cli/cli.h"
 #include "tools/run/scene_run.h"
 #include "tools/run/step_latency.h"
-#include "tools/shared/cli.h"
 
 namespace gewebe {
 

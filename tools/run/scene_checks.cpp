@@ -1,7 +1,7 @@
 #include "tools/run/scene_checks.h"
 
-#include "base/number_text.h"
-#include "base/rounded_text.h"
+#include "text/number_text.h"
+#include "text/rounded_text.h"
 
 #include <algorithm>
 #include <cmath>

@@ -6,9 +6,9 @@
 #include "formats/model/ela.h"
 #include "formats/store/stiffness_store.h"
 #include "formats/stream/kind.h"
-#include "mesh/weld.h"
+#include "repair/weld.h"
+#include "tools/cli/space_option.h"
 #include "tools/run/scene_run.h"
-#include "tools/shared/space_option.h"
 
 #include <algorithm>
 #include <cerrno>

@@ -1,7 +1,7 @@
 #pragma once
 // Progress of a scene that runs: simulated time, real-time factor, frames, time left.
 
-#include "tools/shared/progress_bar.h"
+#include "tools/cli/progress_bar.h"
 
 #include <cstdint>
 #include <deque>

@@ -1,9 +1,9 @@
 #include "tools/run/scene_record.h"
 
 #include "base/error.h"
-#include "base/number_text.h"
 #include "formats/scene/scene.h"
 #include "model/selector.h"
+#include "text/number_text.h"
 
 #include <algorithm>
 #include <filesystem>

@@ -5,11 +5,11 @@
 #include "formats/scene/scene.h"
 #include "formats/scene/scene_answer.h"
 #include "formats/scene/scene_query.h"
+#include "tools/results/undelivered.h"
 #include "tools/run/event_log.h"
 #include "tools/run/scene_record.h"
 #include "tools/run/scene_state_internal.h"
 #include "tools/run/step_latency.h"
-#include "tools/run/undelivered.h"
 
 #include <algorithm>
 #include <exception>

@@ -4,11 +4,11 @@
 #include "base/digest.h"
 #include "base/error.h"
 #include "formats/scene/command.h"
+#include "tools/results/scene_result.h"
+#include "tools/results/scene_shapes.h"
+#include "tools/results/scene_stress.h"
 #include "tools/run/scene_checks.h"
-#include "tools/run/scene_result.h"
 #include "tools/run/scene_run.h"
-#include "tools/run/scene_shapes.h"
-#include "tools/run/scene_stress.h"
 
 #include <cstdint>
 #include <map>

@@ -1,6 +1,6 @@
 #include "tools/run/step_latency.h"
 
-#include "base/number_text.h"
+#include "text/number_text.h"
 
 #include <algorithm>
 #include <chrono>

@@ -1,6 +1,6 @@
 #include "tools/store/store_arguments.h"
 
-#include "compliance/column_compression.h"
+#include "columns/column_compression.h"
 
 #include <charconv>
 

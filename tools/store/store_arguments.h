@@ -3,7 +3,7 @@
 
 #include "formats/store/stiffness_store.h"
 #include "model/selector.h"
-#include "tools/shared/cli.h"
+#include "tools/cli/cli.h"
 
 #include <cstdint>
 #include <optional>

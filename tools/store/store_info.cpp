@@ -1,8 +1,8 @@
 #include "tools/store/store_info.h"
 
 #include "base/digest.h"
-#include "compliance/compressed_columns.h"
-#include "compliance/verify.h"
+#include "columns/compressed_columns.h"
+#include "columns/verify.h"
 
 #include <algorithm>
 #include <cstdio>

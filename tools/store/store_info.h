@@ -3,7 +3,7 @@
 
 #include "formats/store/stiffness_store.h"
 #include "formats/store/stiffness_store_writer.h"
-#include "tools/shared/cli.h"
+#include "tools/cli/cli.h"
 
 #include <cstdint>
 #include <string>

@@ -1,12 +1,12 @@
 #include "tools/store/store_making.h"
 
-#include "compliance/column_compression.h"
-#include "compliance/compliance_columns.h"
+#include "columns/column_compression.h"
+#include "columns/compliance_columns.h"
 #include "dynamics/relaxation.h"
+#include "fem/model_stiffness.h"
 #include "formats/model/ela.h"
+#include "linalg/condition.h"
 #include "model/selector.h"
-#include "solid/model_stiffness.h"
-#include "solve/condition.h"
 
 #include <algorithm>
 #include <chrono>

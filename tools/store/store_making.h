@@ -2,7 +2,7 @@
 // ffe-precompute: models into a store.
 
 #include "formats/store/stiffness_store_writer.h"
-#include "tools/shared/cli.h"
+#include "tools/cli/cli.h"
 #include "tools/store/store_arguments.h"
 #include "tools/store/store_info.h"
 

@@ -1,8 +1,8 @@
 #include "tools/store/store_merging.h"
 
-#include "base/columns.h"
 #include "base/error.h"
-#include "compliance/column_compression.h"
+#include "columns/column_compression.h"
+#include "columns/columns.h"
 #include "tools/store/store_making.h"
 
 #include <algorithm>

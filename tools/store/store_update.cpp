@@ -1,14 +1,14 @@
 #include "tools/store/store_update.h"
 
 #include "compliance/axis_solver.h"
-#include "cutting/corrected_columns.h"
-#include "cutting/corrected_compliance.h"
+#include "cutting/cut_origin.h"
+#include "fem/model_stiffness.h"
 #include "formats/model/ela.h"
-#include "model/cut_origin.h"
-#include "solid/model_stiffness.h"
-#include "solve/condition.h"
+#include "linalg/condition.h"
 #include "tools/store/store_making.h"
 #include "tools/store/store_merging.h"
+#include "update/corrected_columns.h"
+#include "update/corrected_compliance.h"
 
 #include <memory>
 #include <string>

@@ -1,0 +1,25 @@
+#include "columns/column_sum_body_internal.h"
+
+namespace gewebe {
+
+void column_sum_avx2(const double* const* column, const double* factor, std::size_t count,
+                     double* sum, std::size_t begin, std::size_t end) {
+  add_all(column, factor, count, sum, begin, end);
+}
+
+void column_sum_avx2(const float* const* column, const double* factor, std::size_t count,
+                     double* sum, std::size_t begin, std::size_t end) {
+  add_all(column, factor, count, sum, begin, end);
+}
+
+void column_sum_avx2(const std::int16_t* const* column, const double* factor, std::size_t count,
+                     double* sum, std::size_t begin, std::size_t end) {
+  add_all(column, factor, count, sum, begin, end);
+}
+
+void column_sum_avx2(const std::int8_t* const* column, const double* factor, std::size_t count,
+                     double* sum, std::size_t begin, std::size_t end) {
+  add_all(column, factor, count, sum, begin, end);
+}
+
+} // namespace gewebe

@@ -1,0 +1,24 @@
+#pragma once
+// The skin of a cut solid whose parts come off.
+
+#include "cutting/cut.h"
+#include "model/model.h"
+
+#include <cstdint>
+
+namespace gewebe {
+
+struct SkinPartsReport {
+  std::uint64_t torn = 0;  ///< edges that were not cut, between triangles of different parts
+  std::uint64_t moved = 0; ///< points that follow another element, which is of their part
+};
+
+/// Gives each part (free_parts) its piece of the model's skin. What hangs together as skin though
+/// its elements have come apart, for a blade was not through it yet, is torn between triangles,
+/// each of which goes with most of its points; the openings are closed on both sides alike, by
+/// triangles about their middles. Where a hundredth of its points at most follow elements of
+/// another part, these are taken for lost, and nothing is torn.
+/// \pre the parts are of this model; its skin is closed where it is torn
+SkinPartsReport part_skin(const Model& model, FreeParts& parts);
+
+} // namespace gewebe

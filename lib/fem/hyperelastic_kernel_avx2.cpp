@@ -1,0 +1,9 @@
+#include "fem/hyperelastic_kernel_body_internal.h"
+
+namespace gewebe {
+
+void add_tangent_avx2(const TangentPoint& point, std::size_t count, TangentSums& sums) {
+  add_tangent(point, count, sums);
+}
+
+} // namespace gewebe

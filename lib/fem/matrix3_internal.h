@@ -1,0 +1,16 @@
+#pragma once
+// Blocks of fem/element.h as Eigen's matrices.
+
+#include "fem/element.h"
+
+#include <Eigen/Core>
+
+namespace gewebe {
+
+using Matrix3 = Eigen::Matrix<double, 3, 3, Eigen::RowMajor>;
+
+inline Matrix3 matrix(const SolidBlock& block) {
+  return Eigen::Map<const Matrix3>(block.data());
+}
+
+} // namespace gewebe

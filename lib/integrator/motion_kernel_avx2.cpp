@@ -1,0 +1,7 @@
+#include "integrator/motion_kernel_body_internal.h"
+
+namespace gewebe {
+
+const MotionKernel motion_kernel_avx2{&pull, &product, &increase};
+
+} // namespace gewebe

@@ -1,0 +1,145 @@
+#include "integrator/motion_tangent_internal.h"
+
+#include "base/parallel.h"
+#include "base/unique_number.h"
+#include "fem/assembly_blocks.h"
+#include "fem/hyperelastic.h"
+#include "fem/matrix3_internal.h"
+#include "integrator/motion_quick_internal.h"
+
+#include <Eigen/Cholesky>
+#include <Eigen/Core>
+#include <Eigen/Eigenvalues>
+
+#include <algorithm>
+#include <array>
+#include <span>
+
+namespace gewebe {
+
+namespace {
+
+// Elements from where on other threads are worth it, see parallel_blocks_if.
+constexpr std::size_t worth_linear = 128, worth_quadratic = 32;
+
+/// What the turning of the frame adds to the tangent of a corotational element, where positive:
+/// the energy aᵀ m a of a = Rᵀ curl of the displacement, over twice the volume. Exact for linear
+/// elements without damping.
+Matrix3 turning(const SolidElement& element, const ElementFrame& frame) {
+  const auto [lambda, mu] = element.material;
+  const SymmetricBlock& s = frame.stretch;
+  const double trace = s[0] + s[3] + s[5];
+  Matrix3 g;
+  g << trace - s[0], -s[1], -s[2], -s[1], trace - s[3], -s[4], -s[2], -s[4], trace - s[5];
+  const Eigen::SelfAdjointEigenSolver<Matrix3> solver(g);
+  Eigen::Vector3d value;
+  for (int k = 0; k < 3; ++k) {
+    const double pair = solver.eigenvalues()[k];
+    value[k] = pair > 0 ? std::max(0.0, mu + (lambda * (trace - 3) - 2 * mu) / pair) : 0;
+  }
+  return solver.eigenvectors() * value.asDiagonal() * solver.eigenvectors().transpose();
+}
+
+Matrix3 cross_matrix(const Vec3& v) {
+  Matrix3 m;
+  m << 0, -v.z, v.y, v.z, 0, -v.x, -v.y, v.x, 0;
+  return m;
+}
+
+/// Gradient of a node's shape function in the middle of the element.
+Vec3 middle_gradient(const SolidElement& e, std::size_t a, bool quadratic) {
+  if (!quadratic)
+    return e.gradient[a];
+  if (a < 4)
+    return {};
+  const auto [i, j] = tetrahedron_edges[a - 4];
+  return e.gradient[i] + e.gradient[j];
+}
+
+/// Tangents of Neo-Hookean elements, bubbles eliminated.
+std::vector<Numbers> hyperelastic_tangents(const MotionBody& body, const SolidEnergy& energy,
+                                           const Numbers& at, const Context& context) {
+  const std::size_t count = solid_nodes(body.mesh);
+  const auto order = static_cast<Eigen::Index>(3 * count);
+  std::vector<Numbers> of_element(body.elements.size());
+  const bool worth = body.elements.size() >= (count == 10 ? worth_quadratic : worth_linear);
+  const auto respond = [&](std::size_t begin, std::size_t end) {
+    HyperelasticResponse response;
+    for (std::size_t t = begin; t < end; ++t) {
+      const std::array<Vec3, 10> u = energy.displacements(at, t);
+      hyperelastic_response(body.elements[t], HyperelasticLaw::stable_neo_hookean,
+                            std::span(u).first(count), energy.bubble(t),
+                            HyperelasticPart::positive_tangent, response);
+      const Eigen::Map<const Eigen::Matrix<double, 33, 33, Eigen::RowMajor>> k(
+          response.tangent.data());
+      of_element[t].resize(9 * count * count);
+      Eigen::Map<Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>> own(
+          of_element[t].data(), order, order);
+      own = k.topLeftCorner(order, order);
+      if (count == 10) {
+        const Eigen::Matrix<double, 3, 30> between = k.bottomLeftCorner<3, 30>();
+        own.noalias() -= between.transpose() * k.bottomRightCorner<3, 3>().llt().solve(between);
+      }
+    }
+  };
+  parallel_blocks_if(worth, context, body.elements.size(), 16, respond);
+  return of_element;
+}
+
+} // namespace
+
+void MotionTangent::make(const MotionObjective& objective, const Numbers& at,
+                         const Context& context) {
+  made_ = false;
+  const MotionBody& body = objective.body();
+  const SolidEnergy& energy = objective.energy();
+  const std::size_t count = solid_nodes(body.mesh);
+  const bool corotational = energy.law() == SolidLaw::corotational;
+  std::vector<Numbers> of_element;
+  if (!corotational)
+    of_element = hyperelastic_tangents(body, energy, at, context);
+  const double scale = (corotational ? 1 : 0) + objective.damping();
+  std::vector<Matrix3> turns(body.elements.size()), frames(body.elements.size());
+  for (std::size_t t = 0; t < body.elements.size(); ++t) {
+    const ElementFrame frame = energy.frame(t);
+    frames[t] = matrix(frame.rotation);
+    turns[t] = corotational ? turning(body.elements[t], frame) : Matrix3(Matrix3::Zero());
+  }
+  const auto block_of = [&](std::size_t t, std::size_t a, std::size_t b) {
+    const SolidElement& e = body.elements[t];
+    const SolidBlock small = count == 4 ? linear_block(e, a, b) : quadratic_block(e, a, b);
+    const Matrix3 ga = cross_matrix(middle_gradient(e, a, count == 10)),
+                  gb = cross_matrix(middle_gradient(e, b, count == 10));
+    const Matrix3 local = scale * matrix(small) + e.volume * ga.transpose() * turns[t] * gb;
+    SolidBlock block;
+    Eigen::Map<Matrix3> to(block.data());
+    to = frames[t] * local * frames[t].transpose();
+    if (!corotational)
+      for (std::size_t n = 0; n < 9; ++n)
+        block[n] += of_element[t][3 * count * (3 * a + n / 3) + 3 * b + n % 3];
+    return block;
+  };
+  tangent_ = assembled_matrix(body.mesh, block_of, objective.state().held, context);
+  if (!energy.springs().empty())
+    tangent_ = energy.springs().with_tangent(tangent_, at, 1 / objective.step());
+  add_masses(body, objective.step(), tangent_);
+  if (factor_ && factor_->order() == tangent_.order() && !renewed_)
+    factor_->refactor(tangent_, context);
+  else
+    factor_.emplace(tangent_, context);
+  renewed_ = false;
+  made_ = true;
+  version_ = unique_number();
+}
+
+void MotionTangent::unit_responses(std::span<const std::size_t> axes,
+                                   std::span<double> columns) const {
+  solve_unit_axes(tangent_, *factor_, axes, columns);
+}
+
+void MotionTangent::solve(Numbers& v) const {
+  const Numbers f = v;
+  solve_axes(tangent_, *factor_, f, v);
+}
+
+} // namespace gewebe

@@ -1,0 +1,39 @@
+#pragma once
+// The tangent of the reference of integrator/solid_motion.h.
+
+#include "base/context.h"
+#include "integrator/motion_objective_internal.h"
+#include "linalg/factor.h"
+#include "linalg/stiffness.h"
+
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <vector>
+
+namespace gewebe {
+
+class MotionTangent {
+public:
+  /// Other axes are held.
+  void renew() noexcept { renewed_ = true; }
+  bool is_made() const noexcept { return made_; }
+  /// Number of the matrix (base/unique_number.h), a new one by each make().
+  std::uint64_t version() const noexcept { return version_; }
+  /// Its factor, positive definite, where the last evaluation was, at `at`. \throw as Factor: then
+  /// it isn't made
+  void make(const MotionObjective& objective, const Numbers& at, const Context& context);
+  /// Responses to unit forces along axes, columns of all axes. \pre made
+  void unit_responses(std::span<const std::size_t> axes, std::span<double> columns) const;
+  /// In place. \pre made
+  void solve(Numbers& v) const;
+
+private:
+  bool renewed_ = true, made_ = false;
+  std::uint64_t version_ = 0;
+  StiffnessMatrix tangent_;
+  std::optional<Factor> factor_;
+};
+
+} // namespace gewebe

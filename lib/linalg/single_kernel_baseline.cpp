@@ -1,0 +1,7 @@
+#include "linalg/single_kernel_body_internal.h"
+
+namespace gewebe {
+
+const SingleKernel single_kernel_baseline{&forward, &backward};
+
+} // namespace gewebe

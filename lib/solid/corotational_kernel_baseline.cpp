@@ -1,7 +1,0 @@
-#include "solid/corotational_kernel_body_internal.h"
-
-namespace gewebe {
-
-const CorotationalKernel corotational_kernel_baseline{&evaluate<4>, &evaluate<10>, &turn};
-
-} // namespace gewebe

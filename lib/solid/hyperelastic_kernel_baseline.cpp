@@ -1,9 +1,0 @@
-#include "solid/hyperelastic_kernel_body_internal.h"
-
-namespace gewebe {
-
-void add_tangent_baseline(const TangentPoint& point, std::size_t count, TangentSums& sums) {
-  add_tangent(point, count, sums);
-}
-
-} // namespace gewebe

@@ -1,7 +1,0 @@
-#include "solid/motion_kernel_body_internal.h"
-
-namespace gewebe {
-
-const MotionKernel motion_kernel_avx2{&pull, &product, &increase};
-
-} // namespace gewebe

@@ -1,8 +1,0 @@
-#include "solid/warp_kernel_body_internal.h"
-
-namespace gewebe {
-
-const WarpKernel warp_kernel_baseline{&find_rotations, &ask,     &turn_middles, &find_moments,
-                                      &take_back,      &combine, &project};
-
-} // namespace gewebe

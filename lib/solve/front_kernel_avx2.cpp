@@ -1,7 +1,0 @@
-#include "solve/front_kernel_body_internal.h"
-
-namespace gewebe {
-
-const FrontKernel front_kernel_avx2{strip_rows, square_size, add, eliminate, solve, update};
-
-} // namespace gewebe

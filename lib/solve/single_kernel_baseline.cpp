@@ -1,7 +1,0 @@
-#include "solve/single_kernel_body_internal.h"
-
-namespace gewebe {
-
-const SingleKernel single_kernel_baseline{&forward, &backward};
-
-} // namespace gewebe

@@ -1,0 +1,85 @@
+#pragma once
+// Stiffness of an object that is cut repeatedly. After each cut the cheapest method updates the
+// factor, so that solutions stay exact. Stored columns of the uncut net remain in use. A solid's
+// factor is refactored in part, after K was assembled again for the nodes of changed elements.
+
+#include "base/context.h"
+#include "compliance/compliance_source.h"
+#include "linalg/frontal_factor.h"
+#include "model/model.h"
+#include "update/woodbury.h"
+
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <span>
+#include <vector>
+
+namespace gewebe {
+
+/// Method that updates the stiffness after a cut.
+enum class CutWay : std::uint8_t {
+  woodbury, ///< the factor stays, its solutions are corrected (Sherman–Morrison–Woodbury)
+  refactor, ///< partial refactorisation: the fronts that the cut affects are computed again
+  fresh,    ///< all fronts are computed again
+};
+
+/// Work of an update.
+struct CutWork {
+  CutWay way = CutWay::fresh;
+  bool unprepared = false; ///< the previous model had to be factorised first
+  std::size_t rank = 0;    ///< for Woodbury, all cuts since the factor counted
+  FrontalWork factor;      ///< of refactor and fresh
+};
+
+/// Factor of a model and its cuts.
+class CutStiffness {
+public:
+  /// Starts with a model that has not been cut.
+  /// \param source  of its compliance, whose columns remain in use; or null
+  CutStiffness(std::shared_ptr<const Model> first, std::shared_ptr<const ComplianceSource> source,
+               const Context& context);
+
+  /// Factorises the present model in advance of the next cut. \throw as FrontalFactor
+  void prepare();
+
+  /// Updates the stiffness to the model after the next cut; see CutModel for origin and place. The
+  /// choice of the method depends on the models only, so that repeated runs are the same to the
+  /// bit.
+  /// \param way  the method; empty: the cheapest
+  /// \throw SingularStiffness that names the free nodes; as FrontalFactor. The object is then
+  /// unusable
+  CutWork cut(std::shared_ptr<const Model> next, std::span<const std::uint32_t> origin,
+              std::span<const std::uint32_t> place, std::optional<CutWay> way = {});
+
+  /// Compliance of the present model, valid until the next cut.
+  /// \pre cut() or prepare() was called
+  std::shared_ptr<ComplianceSource> compliance() const;
+
+private:
+  bool is_solid() const { return !now_->tetrahedra.empty(); }
+  std::vector<std::uint32_t> follow_matrix();
+  bool woodbury_pays(std::size_t rank) const;
+  std::function<void()> still_valid() const;
+  AxesSolve solver() const;
+  void require_condition();
+  void factorise(const std::function<void()>& work);
+  std::shared_ptr<const Model> first_, factored_, now_;
+  std::shared_ptr<const ComplianceSource> source_;
+  Context context_;
+  std::vector<std::uint32_t> first_origin_, first_place_; ///< from first_ to now_
+  std::vector<std::uint32_t> origin_, place_;             ///< from factored_ to now_
+  NodeMatrix matrix_;                                     ///< of a solid: that of factor_
+  std::vector<double> row_norm_;                          ///< of its nodes
+  std::shared_ptr<FrontalFactor> factor_;
+  std::shared_ptr<const WoodburySolver> woodbury_;
+  std::shared_ptr<std::uint64_t> generation_ = std::make_shared<std::uint64_t>(0); ///< of factor_
+  double norm_ = 0;             ///< bound of ‖K‖₁
+  double fresh_operations_ = 0; ///< of the last factor with an order of its own
+  double reached_ = 0;          ///< operations of the last refactorisation
+  double accepted_pivot_ = 1;   ///< smallest pivot for which the condition was small enough
+};
+
+} // namespace gewebe

@@ -1,0 +1,31 @@
+#pragma once
+// The stiffness of a solid by its nodes, which follows cuts row by row.
+
+#include "linalg/node_matrix.h"
+#include "model/model.h"
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+namespace gewebe {
+
+/// K of the elements. \pre check_model(model) passes, and there are no springs
+/// \throw Error as solid_elements
+NodeMatrix node_stiffness(const Model& model);
+
+/// Goes over to a model with more nodes, or as many: rows of these are written anew, all others
+/// are as they were. Equal to node_stiffness(model), to the bit, but for the order of blocks.
+/// \param rows ascending: nodes of elements that are others than before, all new ones among them
+void update_node_stiffness(NodeMatrix& matrix, const Model& model,
+                           std::span<const std::uint32_t> rows);
+
+/// Nodes of a model whose elements are others than those of the model before.
+/// \param place by node before: its number now, or CutModel::gone \return ascending
+std::vector<std::uint32_t> changed_rows(const Model& before, const Model& now,
+                                        std::span<const std::uint32_t> place);
+
+/// The largest sum of magnitudes along a row of the node; of all nodes the largest is ‖K‖₁.
+double row_norm(const NodeMatrix& matrix, std::size_t node);
+
+} // namespace gewebe

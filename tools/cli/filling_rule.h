@@ -1,0 +1,17 @@
+#pragma once
+// --rule and --on-open: what lies inside a surface. Links neither OpenVDB nor the voxelizer.
+
+#include "voxelization/voxelize.h"
+
+#include <string>
+
+namespace gewebe {
+
+/// --rule and --on-open. \pre one of their words
+VoxelRule voxel_rule_from_text(const std::string& text);
+OpenMesh open_mesh_from_text(const std::string& text);
+
+/// What is wrong with a mesh that was voxelized, for a warning; "" if nothing.
+std::string mesh_defects(const VoxelizeReport& mesh, const VoxelizeOptions& options);
+
+} // namespace gewebe

@@ -1,0 +1,163 @@
+#include "tools/model/model_arguments.h"
+
+#include "formats/mesh/mesh_file.h"
+#include "model/check.h"
+#include "model/material_table.h"
+
+#include <vector>
+
+namespace gewebe {
+
+namespace {
+
+/// What the library finds wrong with an option's text is wrong use.
+template <class Work>
+auto parsed(const char* option, Work&& parse) {
+  try {
+    return parse();
+  } catch (const Error& error) {
+    throw UsageError(std::string(option) + ": " + error.what());
+  }
+}
+
+void refuse(bool wrong, const char* what) {
+  if (wrong)
+    throw UsageError(what);
+}
+
+std::vector<std::string> preset_names() {
+  std::vector<std::string> names;
+  for (const Material& material : material_presets())
+    names.push_back(material.name);
+  return names;
+}
+
+/// The text of a table that parses.
+std::string checked_table(const std::string& file) {
+  Input input(file, false);
+  std::string text = input.read_all();
+  (void)parse_material_table(text, input.name());
+  return text;
+}
+
+} // namespace
+
+void declare(cli::Program& p, ModelArguments& a) {
+  BuildOptions& b = a.build;
+  p.option("--fix", a.fix, "SELECTOR", "nodes that cannot move, or none");
+  p.option("--fix-axes", a.axes, "AXES", "axes along which --fix holds nodes")
+      .one_of({"x", "y", "z", "xy", "xz", "yz", "xyz"});
+  p.option("--centrals", b.centrals, "K", "central nodes per component").range(0, 1000);
+  p.option("--central-stiffness", b.central_factor, "F",
+           "stiffness of c springs over that of e springs")
+      .range(0, 1e9);
+  p.flag("--centrals-free", b.centrals_free, "central nodes can move");
+  p.flag("--bend", b.bend, "add bending springs across edges");
+  p.option("--bend-stiffness", b.bend_factor, "F", "stiffness of b springs over that of the edge")
+      .range(0, 1e9);
+  p.option("--material", a.material, "NAME",
+           "material, or PART=NAME for a part; see --list-materials")
+      .such_as(preset_names());
+  p.option("--materials", a.materials, "FILE", "table of materials that adds to the presets");
+  p.flag("--list-materials", a.list_materials, "write the table of materials instead of a model");
+  p.option("--density", a.values.density, "D", "density in g/mm3, instead of the material's")
+      .positive();
+  p.option("--young", a.values.young, "E", "Young's modulus in Pa, instead of the material's")
+      .positive();
+  p.flag("--solid", a.solid, "fill a closed surface with tetrahedra");
+  p.option("--cell", a.cell, "S", "with --solid: edge of the cells in mm").positive();
+  p.option("--rule", a.rule, "RULE", "with --solid: when a point is inside: parity, winding")
+      .one_of({"parity", "winding"});
+  p.option("--on-open", a.on_open, "WHAT",
+           "with --solid, an open surface: error, warn (odd rays stay empty), fill (close the "
+           "holes)")
+      .one_of({"error", "warn", "fill"});
+  p.flag("--no-skin", a.no_skin, "with --solid: leave out the skin");
+  p.option("--poisson", a.values.poisson, "NU",
+           "Poisson's ratio of tetrahedra, instead of the material's")
+      .range(0, 0.4999999);
+  p.option("--order", a.order, "N", "elements: 1 linear, 2 quadratic").range(1, 2);
+  p.option("--thickness", a.values.thickness, "H",
+           "thickness of a net in mm, instead of the material's")
+      .positive();
+  p.option("--damping-ratio", a.values.damping_ratio, "Z",
+           "damping ratio of springs, instead of the material's")
+      .range(0, 1e6);
+  p.option("--stiffness", b.stiffness, "K", "stiffness of every e spring in g/s2").positive();
+  p.option("--mass", b.mass, "M", "mass of every surface node in g").positive();
+  p.option("--drag", b.drag_rate, "RATE", "drag of a node per mass in 1/s").range(0, 1e9);
+  p.flag("--normals", b.normals, "add vertex normals");
+  p.option("--dt", a.dt, "T", "refuse a net for which an explicit step of T s is not safe")
+      .positive();
+  p.flag("--scale-mass", a.scale_mass, "with --dt: raise masses until the step is safe");
+  p.option("--fit", a.fit, "FILE", "find Young's moduli of a solid from measurements");
+  p.option("--primitive", a.primitive, "KIND",
+           "plane:MxN, tube:MxN or sphere:MxN instead of a mesh")
+      .such_as({"plane:", "tube:", "sphere:"});
+  p.option("--size", a.size, "A,B", "size of the primitive in mm");
+  p.option("--name", a.name, "NAME", "name of the model; default: that of its first material");
+  p.option("--unit", a.unit, "UNIT", "unit of the mesh: m, cm, mm").one_of(mesh_unit_names());
+  p.option("--weld", a.weld, "MODE", "points at one place to merge: auto, all, part, none")
+      .one_of(weld_names());
+  p.option("--repair", a.repair, "LIST",
+           "repairs: weld[:MM], duplicates, orientation, degenerate, holes[:EDGES], all")
+      .such_as({"weld", "duplicates", "orientation", "degenerate", "holes", "all"});
+}
+
+void complete(ModelArguments& a) {
+  refuse(a.build.stiffness && a.values.young, "--stiffness and --young, expected one of them");
+  refuse(a.build.mass && a.values.density, "--mass and --density, expected one of them");
+  refuse(!a.build.bend && a.build.bend_factor != BuildOptions{}.bend_factor,
+         "--bend-stiffness without --bend, expected both");
+  refuse(a.fix == "none" && a.axes != ModelArguments{}.axes,
+         "--fix-axes without --fix, expected both");
+  refuse(a.cell && !a.solid, "--cell without --solid, expected both");
+  refuse(!a.solid && a.rule != ModelArguments{}.rule, "--rule without --solid, expected both");
+  refuse(!a.solid && a.on_open != ModelArguments{}.on_open,
+         "--on-open without --solid, expected both");
+  refuse(a.no_skin && !a.solid, "--no-skin without --solid, expected both");
+  refuse(a.scale_mass && !a.dt, "--scale-mass without --dt, expected both");
+  refuse(a.primitive.empty() && !a.size.empty(), "--size without --primitive, expected both");
+  a.repairs = parsed("--repair", [&] { return parse_repair(a.repair); });
+  if (!a.primitive.empty()) {
+    refuse(a.mesh != "-" || !a.unit.empty() || a.weld != "auto" || !a.repair.empty(),
+           "--primitive makes the mesh, expected no other and no option that reads one");
+    a.matrix = parsed("--primitive", [&] { return parse_primitive(a.primitive, a.size); });
+  }
+  parsed("--name", [&] { check_name(a.name); });
+  refuse(a.list_materials && (a.mesh != "-" || a.matrix || a.fix != "none" || !a.fit.empty()),
+         "--list-materials makes no model, expected no mesh and no nodes");
+  if (a.materials.empty())
+    choose_materials(a); // what is wrong is known before anything is read
+  std::vector<std::string> inputs;
+  if (!a.materials.empty())
+    inputs.push_back(a.materials);
+  if (!a.fit.empty())
+    inputs.push_back(a.fit);
+  if (!a.matrix && !a.list_materials)
+    inputs.push_back(a.mesh);
+  if (a.fix != "none") {
+    a.fixed = parsed("--fix", [&] { return parse_selector(a.fix); });
+    for (const std::string& name : node_list_names(*a.fixed))
+      inputs.push_back(name);
+  }
+  cli::check_one_pipe(inputs);
+}
+
+void choose_materials(ModelArguments& a) {
+  std::string table(preset_table());
+  if (!a.materials.empty())
+    table = merged_tables(table, checked_table(a.materials));
+  const std::vector<Material> known = parse_material_table(table, a.materials);
+  a.build.material = parsed("--material", [&] { return parse_material_choice(a.material, known); });
+  override_materials(a.build.material.materials, a.values);
+}
+
+void list_materials(cli::Run& run, const ModelArguments& a) {
+  Output output(run.output(), run.output_options(false));
+  output.write(a.materials.empty() ? std::string(preset_table())
+                                   : merged_tables(preset_table(), checked_table(a.materials)));
+  output.commit();
+}
+
+} // namespace gewebe

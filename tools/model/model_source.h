@@ -1,0 +1,16 @@
+#pragma once
+// The model that exp2ela begins with, of whichever input it has.
+
+#include "model/model.h"
+#include "tools/cli/cli.h"
+#include "tools/cli/space_option.h"
+#include "tools/model/model_arguments.h"
+
+namespace gewebe::cli {
+
+/// Makes a primitive, or reads a mesh or tetrahedra and builds a model of them, or reads a model.
+/// \param space  gets the space that the model is in
+/// \throw UsageError if an option says nothing of such an input; Error as the readers
+Model model_source(Run& run, ModelArguments a, Space& space);
+
+} // namespace gewebe::cli

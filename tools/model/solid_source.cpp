@@ -1,0 +1,207 @@
+#include "tools/model/solid_source.h"
+
+#include "embedding/skin.h"
+#include "fem/solid_model.h"
+#include "formats/mesh/mesh_file.h"
+#include "formats/tetrahedra/tet_file.h"
+#include "formats/volume/volume_plugin.h"
+#include "tetrahedra/check.h"
+#include "tetrahedra/components.h"
+#include "text/number_text.h"
+#include "text/rounded_text.h"
+#include "tools/cli/filling_rule.h"
+#include "tools/cli/transform_option.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <string>
+#include <utility>
+#include <vector>
+
+namespace gewebe::cli {
+
+namespace {
+
+void refuse(bool wrong, const char* what) {
+  if (wrong)
+    throw UsageError(what);
+}
+
+/// Options of springs say nothing of tetrahedra.
+void refuse_others(const ModelArguments& a) {
+  BuildOptions plain;
+  plain.material = a.build.material;
+  plain.drag_rate = a.build.drag_rate;
+  plain.normals = a.build.normals;
+  refuse(a.build != plain || a.values.thickness || a.values.damping_ratio || a.dt,
+         "a model of tetrahedra, expected no option of springs and no --dt");
+}
+
+/// Options of surfaces neither.
+void refuse_surfaces(const ModelArguments& a) {
+  refuse(a.weld != "auto", "the input holds tetrahedra, expected no --weld");
+  refuse((a.repairs.weld || a.repairs.holes) && a.repair != "all",
+         "the input holds tetrahedra, expected --repair orientation, duplicates or degenerate");
+}
+
+/// Turns and drops tetrahedra by the options, and reports that.
+void repair(Run& run, const std::string& name, TetMesh& mesh, const RepairOptions& asked) {
+  const TetRepair done = repair_tetrahedra(
+      mesh, {.turn = asked.orientation, .flat = asked.degenerate, .duplicates = asked.duplicates});
+  const auto tell = [&](const char* key, std::uint64_t count, const char* text) {
+    run.stats().set(key, count);
+    if (count > 0)
+      run.say(name + ": " + std::to_string(count) + " " + text);
+  };
+  tell("repaired_turned", done.turned, "inverted tetrahedra were turned");
+  tell("repaired_flat", done.dropped_flat, "flat tetrahedra were left out");
+  tell("repaired_duplicates", done.dropped_duplicates, "tetrahedra that stood twice were left out");
+}
+
+Model model_of(Run& run, TetMesh mesh, const ModelArguments& a) {
+  return run.timed("build", [&] {
+    return solid_model(std::move(mesh),
+                       {.material = a.build.material,
+                        .quadratic = a.order == 2,
+                        .drag_rate = a.build.drag_rate,
+                        .normals = a.build.normals},
+                       run.context());
+  });
+}
+
+/// The surface goes along with what fills it.
+void skin(Run& run, const std::string& name, const TriangleMesh& mesh, double cell,
+          const MaterialChoice& choice, Model& model) {
+  std::vector<std::int32_t> materials;
+  for (const std::int32_t part : mesh.part)
+    materials.push_back(chosen_material(choice, part));
+  const SkinReport made =
+      run.timed("skin", [&] { return add_skin(model, mesh, materials, run.context()); });
+  run.stats().set("skin_dropped_triangles", made.dropped_triangles);
+  run.stats().set("skin_points_outside", made.points_outside);
+  run.stats().set("skin_farthest", made.farthest);
+  if (made.dropped_triangles > 0)
+    run.warn(name + ": " + std::to_string(made.dropped_triangles) +
+             " faces with two equal corners are left out of the skin");
+  const double size = bounding_box(mesh).longest_side();
+  const double allowed = std::fmin(cell / 4, 0.02 * size);
+  if (!(made.farthest <= allowed)) {
+    // Where the surface is smooth, its distance from the tetrahedra falls with the square of the
+    // cell; what is thinner than a cell is lost until cells are as small.
+    const double helps = cell * std::fmax(0.25, std::fmin(0.75, allowed / made.farthest));
+    run.warn(name + ": the surface lies up to " + rounded_text(made.farthest) +
+             " mm outside the tetrahedra, where it follows them poorly, expected --cell " +
+             rounded_text(helps) + " or smaller in place of " + rounded_text(cell));
+  }
+}
+
+/// Loose pieces move away from each other unless each is held.
+void warn_of_pieces(Run& run, const std::string& name, const TetMesh& mesh) {
+  const std::uint64_t pieces = component_count(mesh);
+  run.stats().set("pieces", pieces);
+  if (pieces < 2)
+    return;
+  TetMesh largest = mesh;
+  const TetComponentReport report = keep_components(largest, {.largest = 1});
+  run.warn(name + ": the tetrahedra form " + std::to_string(pieces) +
+           " pieces that nothing connects, with " + std::to_string(report.dropped_tetrahedra) +
+           " tetrahedra beside the largest one, expected one piece: a smaller --cell, or a surface "
+           "without loose parts (mc-opt --components largest)");
+}
+
+constexpr double tetrahedra_per_cell = 12; // of a body-centred lattice
+constexpr double usual_tetrahedra = 10000; // without a grade
+constexpr unsigned usual_grade = 1;
+constexpr double voxels_per_cell = 2;
+constexpr double least_share = 0.1;         // of the box of an organ that is filled
+constexpr double told_loss = 0.02;          // of the volume
+constexpr std::int32_t unnamed = INT32_MAX; // no part that --material can name
+
+void tell_change(Run& run, const std::string& what, double cell,
+                 const FilledSurface::Volume& volume) {
+  const double change = (volume.filled - volume.of_surface) / volume.of_surface;
+  if (!(std::abs(change) <= told_loss))
+    run.warn(what + ": cells of " + number_text(cell) + " mm change the volume by " +
+             number_text(std::round(1000 * change) / 10) + " %, expected a smaller --cell");
+}
+
+} // namespace
+
+Model solid_source(Run& run, Input& input, Kind kind, const ModelArguments& a) {
+  refuse_others(a);
+  refuse_surfaces(a);
+  TetReadOptions options;
+  options.kind = kind;
+  options.max_memory = run.context().max_memory;
+  if (!a.unit.empty())
+    options.scale = millimetres_per(a.unit);
+  TetMesh mesh = run.timed("read", [&] { return read_tet_mesh(input, options); });
+  if (!a.transform.empty())
+    at(input.name(), [&] { apply(transform_from_text(a.transform), mesh); });
+  return at(input.name(), [&] {
+    if (!a.repair.empty())
+      repair(run, input.name(), mesh, a.repairs);
+    const TetReport found = examine_tetrahedra(mesh);
+    require_sound(found);
+    run.stats().set("dropped_points", found.unused_points.count);
+    require_parts(a.build.material, mesh.material);
+    return model_of(run, std::move(mesh), a);
+  });
+}
+
+Model filled_surface(Run& run, const std::string& name, const TriangleMesh& mesh,
+                     const ModelArguments& a) {
+  refuse_others(a);
+  const VoxelizeOptions rule{.rule = voxel_rule_from_text(a.rule),
+                             .on_open = open_mesh_from_text(a.on_open)};
+  double volume = std::abs(signed_volume(mesh));
+  if (rule.rule != VoxelRule::parity || rule.on_open != OpenMesh::refuse) {
+    // Parts that are turned inward or open can take all of it away.
+    const Vec3 box = bounding_box(mesh).size();
+    volume = std::max(volume, least_share * box.x * box.y * box.z);
+  }
+  const double cell = a.cell.value_or(std::cbrt(tetrahedra_per_cell * volume / usual_tetrahedra));
+  return at(name, [&] {
+    if (!(cell > 0 && std::isfinite(cell)))
+      throw Error("the surface has no volume, expected a closed one");
+    const std::vector<std::int32_t> parts =
+        mesh.part.empty() ? std::vector<std::int32_t>{} : a.build.material.named;
+    FilledSurface filled = run.timed("fill", [&] {
+      return fill_surface(
+          mesh, name, {cell / voxels_per_cell, cell, usual_grade, parts, rule.rule, rule.on_open},
+          run.context());
+    });
+    for (const VoxelizeReport& found : filled.found)
+      if (const std::string defects = mesh_defects(found, rule); !defects.empty())
+        run.warn(name + ": " + defects);
+    TetMesh& tets = filled.mesh;
+    if (tets.tetrahedra.empty())
+      throw Error("no cell of " + number_text(cell) + " mm lies inside, expected a smaller --cell");
+    run.stats().set("cell", cell);
+    double of_surface = std::abs(signed_volume(mesh));
+    if (of_surface < volume) { // what was found to be inside it
+      of_surface = 0;
+      for (const FilledSurface::Volume& one : filled.volumes)
+        of_surface += one.of_surface;
+    }
+    run.stats().set("volume_surface", of_surface);
+    run.stats().set("volume", gewebe::volume(tets));
+    run.say(name + ": " + std::to_string(tets.tetrahedra.size()) + " tetrahedra of cells of " +
+            number_text(cell) + " mm");
+    for (std::size_t k = 0; k < filled.volumes.size(); ++k)
+      tell_change(run, k < parts.size() ? name + ": part " + std::to_string(parts[k]) : name, cell,
+                  filled.volumes[k]);
+    for (std::int32_t& material : tets.material) // others have the material of all
+      material = static_cast<std::size_t>(material) < parts.size()
+                     ? parts[static_cast<std::size_t>(material)]
+                     : unnamed;
+    warn_of_pieces(run, name, tets);
+    Model model = model_of(run, std::move(tets), a);
+    if (!a.no_skin)
+      skin(run, name, mesh, cell, a.build.material, model);
+    return model;
+  });
+}
+
+} // namespace gewebe::cli

@@ -1,0 +1,66 @@
+#include "tools/results/result_choice.h"
+
+#include "base/error.h"
+#include "tools/results/field_result.h"
+
+#include <limits>
+#include <vector>
+
+namespace gewebe {
+namespace {
+
+std::vector<Kind> kinds_written() {
+  std::vector<Kind> kinds = result_kinds();
+  kinds.push_back(Kind::nifti);
+  return kinds;
+}
+
+} // namespace
+
+void ResultChoice::declare(cli::Program& program) {
+  program.output_kinds(kinds_written());
+  program.option("--field", field_, "IMAGE",
+                 "for results of kind nii: image whose voxels the field has");
+  program
+      .option("--field-at", field_at_, "STATE",
+              "vectors of the field: deformed (point back to rest) or rest (point to the tissue)")
+      .one_of({"deformed", "rest"});
+  program
+      .option("--field-outside", field_outside_, "VALUE", "vectors outside all elements: zero, nan")
+      .one_of({"zero", "nan"});
+}
+
+void ResultChoice::check(const cli::Program& program) const {
+  for (const std::string option : {"--field-at", "--field-outside"})
+    if (program.given(option) && field_.empty())
+      throw UsageError(option + " without --field, expected both");
+}
+
+Kind ResultChoice::kind(const cli::Run& run) const {
+  const bool none = run.output() == "-" && run.to().empty();
+  const Kind kind =
+      none ? Kind::unknown : output_kind(run.to(), run.output(), Kind::hdf5, kinds_written());
+  if ((kind == Kind::nifti) == field_.empty())
+    throw UsageError(field_.empty()
+                         ? "nii is a displacement field, expected --field IMAGE"
+                         : "--field is for a result of kind nii, expected -o FILE.nii.gz");
+  if ((kind == Kind::hdf5 || kind == Kind::vtkhdf) && run.output() == "-")
+    throw UsageError(std::string(kind_name(kind)) +
+                     " can't go to standard output, expected -o FILE");
+  return kind;
+}
+
+std::unique_ptr<ResultWriter> ResultChoice::open(cli::Run& run, Kind kind) const {
+  if (kind == Kind::unknown)
+    return nullptr;
+  if (kind != Kind::nifti)
+    return open_result(kind, run.output(), run.output_options(is_binary(kind)));
+  FieldOptions options;
+  options.like = field_;
+  options.at_rest = field_at_ == "rest";
+  options.outside = field_outside_ == "nan" ? std::numeric_limits<float>::quiet_NaN() : 0;
+  options.warn = [&run](const std::string& text) { run.warn(text); };
+  return open_field_result(run.output(), run.output_options(true), options, run.context());
+}
+
+} // namespace gewebe

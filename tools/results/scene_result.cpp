@@ -1,0 +1,87 @@
+#include "tools/results/scene_result.h"
+
+#include "tools/results/undelivered.h"
+
+#include <algorithm>
+#include <set>
+#include <span>
+#include <vector>
+
+namespace gewebe {
+
+void SceneResult::need_models(const Simulation& simulation, std::size_t objects) const {
+  for (std::size_t i = 0; writer_.wants_models() && i < objects; ++i)
+    (void)simulation.first_model(i);
+}
+
+void SceneResult::add_objects(const Simulation& simulation, std::size_t objects) {
+  static const Model none;
+  for (; objects_ < objects; ++objects_) {
+    const Model& model = writer_.wants_models() ? simulation.first_model(objects_) : none;
+    const std::vector<Cutting>& cuttings = simulation.news().cuttings;
+    const bool part = std::any_of(cuttings.begin(), cuttings.end(), [&](const Cutting& c) {
+      return c.kind == Cutting::Kind::part && c.part == objects_;
+    });
+    deliver([&] {
+      if (part)
+        writer_.add_part(simulation.object(objects_).name, model);
+      else
+        writer_.add_object(simulation.object(objects_).name, model);
+    });
+  }
+}
+
+/// Those that were cut since the last frame.
+void SceneResult::change_objects(const Simulation& simulation) {
+  if (!writer_.wants_models())
+    return;
+  std::set<std::size_t> changed;
+  for (const Cutting& c : simulation.news().cuttings)
+    if (c.kind == Cutting::Kind::cut || c.kind == Cutting::Kind::restored)
+      changed.insert(c.object);
+  for (const std::size_t object : changed)
+    deliver([&] {
+      writer_.change_object(object, simulation.model(object),
+                            simulation.object(object).first_nodes);
+    });
+}
+
+void SceneResult::first_frame(const Simulation& simulation, std::size_t objects) {
+  add_objects(simulation, objects);
+  if (frames_ > 0)
+    return;
+  std::vector<std::vector<double>> rest;
+  std::vector<FrameObject> frame;
+  for (std::size_t i = 0; i < objects; ++i)
+    rest.emplace_back(simulation.object(i).known ? 3 * simulation.first_model(i).nodes.size() : 0);
+  for (std::size_t i = 0; i < objects; ++i)
+    frame.push_back({rest[i], {}, stress_.fields(i)});
+  deliver([&] { writer_.add_frame(0, frame); });
+  ++frames_;
+}
+
+void SceneResult::set_instruments(const Simulation& simulation) {
+  std::vector<InstrumentReport> reports;
+  for (std::size_t k = 0; k < simulation.instrument_count(); ++k)
+    reports.push_back(simulation.instrument(k));
+  std::vector<FrameInstrument> instruments;
+  for (const InstrumentReport& r : reports)
+    instruments.push_back({r.name, r.present, r.shape, r.pose, r.hand.value_or(r.pose.place),
+                           r.force, r.torque, r.nodes});
+  deliver([&] { writer_.set_instruments(instruments); });
+}
+
+void SceneResult::frame(const Simulation& simulation) {
+  add_objects(simulation, simulation.object_count());
+  change_objects(simulation);
+  set_instruments(simulation);
+  std::vector<FrameObject> frame;
+  for (std::size_t i = 0; i < simulation.object_count(); ++i)
+    frame.push_back(
+        {writer_.wants_models() ? simulation.displacement(i) : std::span<const double>(),
+         simulation.contact_forces(i), stress_.fields(i)});
+  deliver([&] { writer_.add_frame(simulation.time(), frame); });
+  ++frames_;
+}
+
+} // namespace gewebe

@@ -1,0 +1,86 @@
+#include "tools/results/scene_stress.h"
+
+#include "base/error.h"
+#include "fem/solid_model.h"
+
+#include <algorithm>
+#include <numeric>
+#include <span>
+#include <utility>
+
+namespace gewebe {
+
+const std::vector<std::uint32_t>& SceneStress::ask(const Simulation& simulation,
+                                                   const EmitStressCommand& command,
+                                                   const LoadNodeList& lists) {
+  const std::size_t object = find_object(simulation, command.object);
+  const Model& model = simulation.model(object);
+  if (model.tetrahedra.empty())
+    throw Error("object " + command.object +
+                " has no tetrahedra, expected a solid for emit stress");
+  if (simulation.object(object).staged)
+    throw Error("object " + command.object +
+                " has a second stage, so that its stress is that of no one material, expected no "
+                "two-step");
+  Solid solid;
+  if (command.nodes) {
+    solid.nodes = select_nodes(model, *command.nodes, lists);
+  } else {
+    solid.nodes.resize(model.nodes.size());
+    std::iota(solid.nodes.begin(), solid.nodes.end(), 0U);
+  }
+  const std::span<const std::uint32_t> first = simulation.object(object).first_nodes;
+  for (const std::uint32_t node : solid.nodes)
+    solid.first.push_back(first.empty() ? node : first[node]);
+  std::ranges::sort(solid.first);
+  take_elements(solid, model);
+  return (solids_[object] = std::move(solid)).nodes;
+}
+
+void SceneStress::take_elements(Solid& solid, const Model& model) {
+  solid.mesh = element_mesh(model);
+  solid.materials = element_materials(model);
+  solid.elements = solid_elements(solid.mesh, solid.materials);
+  solid.fields = solid_fields(solid.mesh, solid.materials, solid.elements,
+                              std::vector<double>(3 * model.nodes.size()));
+}
+
+namespace {
+
+StrainFrames frames_of(const ObjectFacts& object) {
+  if (object.moving_solid)
+    return StrainFrames::elements;
+  return object.warp ? StrainFrames::turning : StrainFrames::resting;
+}
+
+} // namespace
+
+void SceneStress::find(const Simulation& simulation, const Vec3& gravity) {
+  for (auto& [object, solid] : solids_) {
+    if (topology_changed(simulation, object)) {
+      take_elements(solid, simulation.model(object));
+      const std::span<const std::uint32_t> first = simulation.object(object).first_nodes;
+      solid.nodes.clear();
+      for (std::uint32_t i = 0; i < simulation.model(object).nodes.size(); ++i)
+        if (std::ranges::binary_search(solid.first, first.empty() ? i : first[i]))
+          solid.nodes.push_back(i);
+    }
+    solid.fields = solid_fields(solid.mesh, solid.materials, solid.elements,
+                                simulation.local_displacement(object), gravity,
+                                frames_of(simulation.object(object)));
+  }
+}
+
+const SolidFields* SceneStress::fields(std::size_t object) const {
+  const auto found = solids_.find(object);
+  return found == solids_.end() ? nullptr : &found->second.fields;
+}
+
+std::vector<StressAnswer> SceneStress::answers() const {
+  std::vector<StressAnswer> answers;
+  for (const auto& [object, solid] : solids_)
+    answers.push_back({object, solid.nodes, solid.fields.node_stress});
+  return answers;
+}
+
+} // namespace gewebe
