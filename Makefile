@@ -351,7 +351,8 @@ LINT := build/lint
 LINT_CXX := $(wildcard lib/*/*.cpp formats/*/*.cpp tools/*.cpp tools/*/*.cpp tests/*/*.cpp)
 LINT_HEADERS := $(wildcard lib/*/*.h formats/*/*.h tools/*/*.h tests/*/*.h)
 # clang-tidy reads groups of files, as the compiler does: most of its time goes to headers. TIDY='lib tools' looks at these
-# folders alone, COMMITS=40 at what the last 40 commits changed (a header with the .cpp beside it).
+# folders alone, COMMITS=40 at what the last 40 commits changed (of a header, at the .cpp beside it; what else reads it, all of
+# lint sees).
 TIDY ?= lib formats tools tests
 TIDY_CXX := $(filter $(TIDY:%=%/%),$(LINT_CXX))
 ifneq ($(COMMITS),)
@@ -407,7 +408,7 @@ $(SHELL_STAMPS): $(LINT)/%.shellcheck: % | $(FIRST)
 	@shellcheck -x $< && touch $@
 
 # Writes beside the stamp which of our files the file reads, so that their change counts too. (What passed in another
-# clone with the same text is known to scripts/tidy.) `make build/lint/lib/base/text.cpp.tidy` looks at one file.
+# clone with the same text is known to scripts/tidy.) `make build/lint/lib/base/parallel.cpp.tidy` looks at one file.
 TIDY_FLAGS = $(LANGUAGE) $(WARNINGS) $(INCLUDES) $(DEFINES) $(CPPFLAGS) $(FILE_FLAGS)
 $(LINT)/%_avx2.cpp.tidy: FILE_FLAGS := -mavx2 -mfma
 $(LINT)/%_avx512.cpp.tidy: FILE_FLAGS := -mavx512f -mavx512dq -mavx512bw -mavx512vl -mfma

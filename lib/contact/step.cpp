@@ -106,7 +106,6 @@ private:
   void take(CondensedSystem& system, const Step& step, double part);
   bool lower_energy(CondensedSystem& system, double contact);
   bool iterate(CondensedSystem& system, int iteration, bool& converged);
-  void require_settling(double change);
   bool move_bodies(const CondensedSystem& system, bool ends);
   struct Round {
     std::vector<Vec3> to, start;                 ///< ends of the ways; R0
@@ -134,8 +133,6 @@ private:
   double d_hat_;
   double last_step_ = 0; ///< length of the last full step of Newton's method; else infinite
   int way_lags_ = 0, round_lags_ = 0; ///< renewals of friction on the way, and behind solutions
-  double lag_change_ = 0;             ///< of friction by a lag, the last time that it had halved
-  int slow_lags_ = 0;                 ///< lags since
   bool led_ = false;                  ///< some vertices go ways that nothing stops
   std::vector<double> changes_;       ///< of positions, by rounds
   bool settled_ = true;               ///< the last round ended with balanced forces
@@ -326,8 +323,6 @@ bool StepSolver::Work::iterate(CondensedSystem& system, int iteration, bool& con
     contact = renew_gradient();
     residual = system.residual(gradient_);
   }
-  if (lags && !stiffer && system.share() == 0)
-    require_settling(residual.difference / std::max(residual.largest, typical));
   const bool balanced = balances(p.way_tolerance), near = balanced && last_step_ <= d_hat_;
   last_step_ = std::numeric_limits<double>::infinity();
   // The exact Hessian converges fastest from near by; from afar it may be all but singular.
@@ -339,19 +334,6 @@ bool StepSolver::Work::iterate(CondensedSystem& system, int iteration, bool& con
   if (led_ && system.share() > 0 && (balanced || iteration == 0) && follow_way(system, balanced))
     return true;
   return lower_energy(system, contact);
-}
-
-/// Ends the step where renewals of friction's lag do not converge: contacts that change places with
-/// their neighbours for ever would take all its iterations. \param change  of friction forces by
-/// the last renewal, over the largest force
-void StepSolver::Work::require_settling(double change) {
-  ++slow_lags_;
-  if (change <= lag_change_ / 2) {
-    lag_change_ = change;
-    slow_lags_ = 0;
-  }
-  if (slow_lags_ > options_.parameters.slow_lags)
-    throw NotSolved("contact: friction did not settle");
 }
 
 /// Moves all bodies under the forces found. \param ends  with the momenta that belong to them
@@ -445,8 +427,7 @@ bool StepSolver::Work::solve_round(const Round& round, double margin, bool& exac
   if (converged)
     system->advance(1);
   int iteration = 0, searches = 0;
-  way_lags_ = round_lags_ = slow_lags_ = 0;
-  lag_change_ = std::numeric_limits<double>::infinity();
+  way_lags_ = round_lags_ = 0;
   settled_ = true;
   while (!converged) {
     // Better models serve more than the end of this one.
@@ -473,8 +454,6 @@ bool StepSolver::Work::solve_round(const Round& round, double margin, bool& exac
       converged = !energy_.renew_lag(at_, candidates_.vertices(), round_lags_ >= p.whole_lags);
       if (!converged && ++round_lags_ > p.max_lags)
         throw NotSolved("contact: friction did not settle");
-      if (!converged)
-        require_settling(energy_.friction_residual());
     } else if (!candidates_.cover_own(at_, margin / 2)) {
       if (++searches > p.max_way_searches)
         throw NotSolved("contact: bodies move farther than they were searched for");

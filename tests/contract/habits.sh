@@ -41,6 +41,8 @@ test_version_tells_commit_libraries_and_kernels() {
   fi
   [[ $(exp2ela --version) == *'CGAL 5.'* && $(csg --version) != *CGAL* ]] || fail 'who uses CGAL?' "$(exp2ela --version)"
   [[ $(GEWEBE_CPU=baseline csg --version) == *$'\nkernels: baseline' ]] || fail 'other kernels than GEWEBE_CPU says'
+  # What this machine does not have is as good as its best.
+  [[ $(GEWEBE_CPU=avx512 csg --version) == "$(env -u GEWEBE_CPU csg --version)" ]] || fail 'other kernels than the best of this machine'
   GEWEBE_CPU=x87 expect_failure 1 csg csg --version
 }
 

@@ -336,7 +336,7 @@ class Stack(Case):
 
 
 class Drop(Case):
-    """A ball dropped by 30 mm on a slab.
+    """A ball dropped by 30 mm on a slab, or a block with friction that falls flat by 2 mm.
 
     Energy of motion and weight never exceeds that of the start, since what is elastic is positive. In each backward Euler
     step m (v_n - v_(n-1)) = dt (F_n + m g) with v_n = (x_n - x_(n-1)) / dt, so that told forces are those that moved the ball.
@@ -347,14 +347,18 @@ class Drop(Case):
     def expected(self):
         return "m (v_n - v_(n-1)) = dt (F_n + m g) in each step; kinetic and potential energy never above that of the start"
 
-    height = 30.0
+    height, mu = 30.0, 0.0
 
     def build(self, s):
         cells = {"aligned": 4, "turned": 4, "coarse": 2}[self.mesh]
         n = 2 if self.mesh == "coarse" else 6
         s.solid("slab", box((n, n, 1), (60, 60, 10), (-30, -30, -10)), 1e5, fix="z<-9.99")
-        s.solid("ball", ball(cells, 10, (0.3, 0.2, 10 + self.height), degrees=turn_of(self.mesh)), 2e4)
-        s.contact("slab", "ball")
+        if self.mu > 0:
+            body = box((cells, cells, cells), (20, 20, 20), (-10, -10, self.height), degrees=turn_of(self.mesh))
+        else:
+            body = ball(cells, 10, (0.3, 0.2, 10 + self.height), degrees=turn_of(self.mesh))
+        s.solid("ball", body, 2e4)
+        s.contact("slab", "ball", self.mu)
         s.gravity()
         s.emit("shapes", "forces")
         s.steps(0.3)
@@ -1282,6 +1286,7 @@ def cases():
     full(Rest, quick=(6,))
     full(Stack, quick=(1,))
     full(Drop, quick=(1,))
+    full(Drop, height=2.0, mu=0.2)
     full(Balls, quick=(1,))
     full(Balls, offset=8.0, mu=0.0)
     sweep(Balls, [dict(offset=8.0, mu=0.3), dict(offset=0.0, mu=0.3), dict(offset=12.0, mu=0.6)])
