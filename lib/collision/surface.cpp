@@ -32,6 +32,21 @@ std::array<std::uint32_t, 2> ascending(std::uint32_t a, std::uint32_t b) {
   return a < b ? std::array{a, b} : std::array{b, a};
 }
 
+void list_triangles_around(CollisionSurface& surface) {
+  std::vector<std::uint32_t>& first = surface.first_around;
+  first.assign(surface.size() + 1, 0);
+  for (const auto& triangle : surface.triangles)
+    for (const std::uint32_t vertex : triangle)
+      ++first[vertex + 1];
+  for (std::size_t vertex = 0; vertex < surface.size(); ++vertex)
+    first[vertex + 1] += first[vertex];
+  surface.triangles_around.resize(first.back());
+  std::vector<std::uint32_t> next(first.begin(), first.end() - 1);
+  for (std::uint32_t k = 0; k < surface.triangles.size(); ++k)
+    for (const std::uint32_t vertex : surface.triangles[k])
+      surface.triangles_around[next[vertex]++] = k;
+}
+
 } // namespace
 
 void complete_surface(CollisionSurface& surface) {
@@ -79,6 +94,7 @@ void complete_surface(CollisionSurface& surface) {
       if (of_edge[vertex] == 0)
         surface.lone_points.push_back(vertex);
     }
+  list_triangles_around(surface);
 }
 
 } // namespace gewebe::collision

@@ -32,9 +32,15 @@ struct CollisionSurface {
   // Set by complete_surface, which also completes the members above:
   std::vector<std::uint32_t> lone_edges;  ///< numbers of edges of no triangle
   std::vector<std::uint32_t> lone_points; ///< points of no edge
+  /// Triangles of vertex v: triangles_around[first_around[v]] up to that of first_around[v + 1].
+  std::vector<std::uint32_t> first_around, triangles_around;
 
   std::size_t size() const noexcept { return rest.size(); }
   bool is_fixed(std::uint32_t vertex) const { return !fixed.empty() && fixed[vertex] != 0; }
+  std::span<const std::uint32_t> triangles_of(std::uint32_t vertex) const {
+    return std::span(triangles_around)
+        .subspan(first_around[vertex], first_around[vertex + 1] - first_around[vertex]);
+  }
   bool is_held(std::uint32_t vertex, std::uint32_t by) const {
     return !holder.empty() && holder[vertex] == by;
   }
@@ -42,7 +48,7 @@ struct CollisionSurface {
 
 /// Completes a surface. Adds the edges of triangles, and makes `edges` ascending and unique.
 /// `points` becomes all vertices that are part of a primitive or were listed. `owner` and `radius`
-/// become 0 if they are empty. Fills lone_edges and lone_points.
+/// become 0 if they are empty. Fills lone_edges, lone_points and the triangles around vertices.
 /// \throws Error if a vertex is out of range or used twice in a primitive, or lists of vertices
 /// differ in length
 void complete_surface(CollisionSurface& surface);

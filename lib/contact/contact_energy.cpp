@@ -128,6 +128,7 @@ void ContactEnergy::lag(std::span<const Vec3> x, bool damped) {
     return;
   const std::vector<FrictionPair> before = friction_;
   lag_friction(island_.surface, pairs_, x, kappa_, island_.friction, friction_);
+  smooth_friction_pairs(island_.surface, x, begin_, parameters_.stick_per_approach, friction_);
   keep_duals(before, friction_);
   ++lags_;
   if (damped)

@@ -22,12 +22,14 @@ using FrictionTable = collision::OwnerTable<double>;
 /// What friction of a pair is lagged to.
 struct FrictionPair {
   std::uint8_t count = 0; ///< vertices: 2 to 4
+  std::uint8_t first = 0; ///< vertices of the first surface
   std::array<std::uint32_t, 4> vertex{};
   std::array<double, 4> weight{}; ///< relative displacement = sum of weight times displacement
   std::array<Vec3, 2> tangent;    ///< orthonormal
   Vec3 normal;                    ///< unit, towards the vertices of positive weight
   double normal_force = 0;        ///< lambda with the pair's weight
   double limit = 0;               ///< mu times normal_force
+  double added_stick = 0;         ///< to e
   /// Dual variable of primal-dual iterations: the friction force over the limit, as the last step
   /// predicted it; at most 1 long, and 0 until then.
   Vec3 dual;
@@ -41,13 +43,26 @@ void lag_friction(const collision::CollisionSurface& surface, const ContactPairs
                   std::span<const Vec3> x, double kappa, const FrictionTable& friction,
                   std::vector<FrictionPair>& result);
 
+/// Makes lagged friction fit for meshes, whose facets are not the surface that they stand for.
+///
+/// A vertex that is about to pass another one, or an edge, is pushed aside by it, and edges that
+/// are all but parallel push in any direction. Where a surface is flat, friction acts along it and
+/// not across the direction of such a pair. And slip is not known better than to the tilt of facets
+/// against each other times the approach of both surfaces in the step: smaller slip has no fully
+/// developed friction. Otherwise the direction of friction in an impact is that of noise.
+/// \param stick_per_approach  that tilt
+void smooth_friction_pairs(const collision::CollisionSurface& surface, std::span<const Vec3> x,
+                           std::span<const Vec3> x_start, double stick_per_approach,
+                           std::span<FrictionPair> pairs);
+
 /// f0, f0' / u and (f0'' - f0' / u) / u^2 at u, for e > 0.
 struct FrictionValue {
   double value = 0, first_over_u = 0, second = 0;
 };
 FrictionValue smooth_friction(double u, double e);
 
-/// Energy of friction for displacements x - x_start; e: eps_v times the time step, or eps_u.
+/// Energy of friction for displacements x - x_start; e: eps_v times the time step, or eps_u;
+/// each pair adds its own part.
 double friction_energy(std::span<const FrictionPair> pairs, std::span<const Vec3> x,
                        std::span<const Vec3> x_start, double e);
 

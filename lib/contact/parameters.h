@@ -20,6 +20,8 @@ struct Parameters {
   /// Slip speed below which friction is not yet fully developed, mm/s. A body that sticks creeps
   /// with at most this speed.
   double stick_speed = 0.1;
+  /// The same, over the approach of both surfaces: 6 degrees of tilt between facets.
+  double stick_per_approach = 0.1;
 
   /// Typical force of an impact, over the force that would stop a vertex within the step.
   double stop_share = 0.125;

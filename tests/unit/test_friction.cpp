@@ -219,6 +219,79 @@ TEST(Friction, NormalForceIsTheBarriers) {
   }
 }
 
+/// Two equal flat sheets, one moved by `aside` along x and by `gap` along z.
+collision::CollisionSurface flat_sheets(double gap, double aside) {
+  collision::CollisionSurface surface = test::two_sheets(4, 0, 0, 0.1, 1);
+  surface.points.clear();
+  surface.edges.clear();
+  surface.rest.resize(32);
+  surface.owner.resize(32);
+  surface.radius.resize(32);
+  for (std::size_t k = 0; k < 16; ++k)
+    surface.rest[16 + k] = surface.rest[k] + Vec3{aside, 0, gap};
+  complete_surface(surface);
+  return surface;
+}
+
+TEST(Friction, AnApproachOfFlatSurfacesSlipsNowhere) {
+  for (const double aside : {0.0, 0.003, 0.007}) {
+    Lagged all;
+    all.surface = flat_sheets(0.005, aside);
+    collision::AllowedPairs allowed(2, 0);
+    allowed.set(0, 1, 1);
+    const std::vector<Vec3>& x = all.surface.rest;
+    collision::Candidates candidates;
+    collision::BroadPhase(all.surface).find(all.surface, x, x, 0.01, allowed, candidates);
+    find_active_pairs(all.surface, candidates, x, 0.01, all.contact);
+    lag_friction(all.surface, all.contact, x, 2, FrictionTable(2, 0.5), all.pairs);
+    std::vector<Vec3> start = x;
+    for (std::size_t k = 16; k < 32; ++k)
+      start[k].z += 0.4;
+    smooth_friction_pairs(all.surface, x, start, 0.1, all.pairs);
+    ASSERT_GE(all.pairs.size(), 16U);
+    std::vector<Vec3> gradient(x.size());
+    std::vector<double> normal_force(x.size());
+    (void)add_friction_gradient(all.pairs, x, start, 1e-5, gradient);
+    for (const FrictionPair& pair : all.pairs) {
+      EXPECT_NEAR(pair.added_stick, 0.04, 1e-4);
+      for (std::size_t k = 0; k < pair.count; ++k)
+        normal_force[pair.vertex[k]] += std::abs(pair.weight[k]) * pair.normal_force;
+    }
+    for (const std::uint32_t inner : {5U, 6U, 9U, 10U, 21U, 22U, 25U, 26U}) {
+      EXPECT_GT(normal_force[inner], 0);
+      EXPECT_LT(norm(gradient[inner]), 0.05 * 0.5 * normal_force[inner]);
+    }
+  }
+}
+
+TEST(Friction, SharpEdgesAndInstrumentsKeepTheDirectionOfTheirDistance) {
+  // Roofs with ridges along x and, turned over, along y.
+  collision::CollisionSurface surface;
+  surface.rest = {{-1, 0, 0},   {1, 0, 0}, {0, 1, -1}, {0, -1, -1},  {0, -1, 0.01},
+                  {0, 1, 0.01}, {1, 0, 1}, {-1, 0, 1}, {0.5, 0, 0.2}};
+  surface.triangles = {{0, 1, 2}, {1, 0, 3}, {5, 4, 6}, {4, 5, 7}};
+  surface.owner = {0, 0, 0, 0, 1, 1, 1, 1, 2};
+  surface.radius.assign(9, 0);
+  surface.radius[8] = 0.19;
+  surface.points = {8};
+  complete_surface(surface);
+  collision::AllowedPairs allowed(3, 1);
+  const std::vector<Vec3>& x = surface.rest;
+  collision::Candidates candidates;
+  collision::BroadPhase(surface).find(surface, x, x, 0.03, allowed, candidates);
+  ContactPairs contact;
+  find_active_pairs(surface, candidates, x, 0.03, contact);
+  std::vector<FrictionPair> pairs, smoothed;
+  lag_friction(surface, contact, x, 2, FrictionTable(3, 0.5), pairs);
+  ASSERT_GE(pairs.size(), 2U);
+  smoothed = pairs;
+  smooth_friction_pairs(surface, x, x, 0.1, smoothed);
+  for (std::size_t k = 0; k < pairs.size(); ++k) {
+    EXPECT_LT(norm(smoothed[k].normal - pairs[k].normal), 1e-6);
+    EXPECT_EQ(smoothed[k].added_stick, 0);
+  }
+}
+
 TEST(Friction, NoneWithoutACoefficient) {
   EXPECT_TRUE(lagged(0, 1).pairs.empty());
 }
