@@ -2,11 +2,12 @@
 // What a step of integrator/solid_motion.h makes least.
 
 #include "base/context.h"
+#include "geometry/vec3.h"
 #include "integrator/motion_body_internal.h"
 #include "integrator/solid_energy_internal.h"
 
-#include <array>
 #include <cmath>
+#include <span>
 
 namespace gewebe {
 
@@ -19,6 +20,14 @@ struct MotionPoint {
   double unsure = 0; ///< of the value, by rounding
 };
 
+/// Rigid motion: a rotation about the centre of mass, then a translation.
+struct RigidChange {
+  double turn = 1; ///< unit quaternion of the rotation: this and `axis`
+  Vec3 axis;
+  Vec3 translation;
+  double largest = 0; ///< bound on the displacement of a node, mm
+};
+
 class MotionObjective {
 public:
   /// Of a step of h. \pre all outlive this; the state doesn't change meanwhile
@@ -29,13 +38,16 @@ public:
   void evaluate(MotionPoint& point, const Context& context, bool turns = false) const;
   /// The value of the state's shape, moved without a turn to `at`, its elastic energy given.
   double value_of_shape(const Numbers& at, double elastic) const;
-  /// Displacement by which a free body at `at` is off the motion that its momentum, the load and
-  /// further forces give it. \param more  3 n, or none
-  std::array<double, 3> momentum_off(std::span<const double> at,
-                                     std::span<const double> more) const;
-  /// A free body goes on with its momentum and the load's: moves it by what unfinished rounds took
-  /// or gave.
+  /// Rigid motion of a free body at `at` that balances the sums of forces and of moments of
+  /// inertia, the load and further forces, which keep their directions. Elastic energy stays, so
+  /// that it lowers the value. It turns a body that these compress by a first approximation alone,
+  /// as there the balance is not stable. \param more  3 n, or none
+  RigidChange balance(std::span<const double> at, std::span<const double> more) const;
+  void move(MotionPoint& point, const RigidChange& by) const;
+  /// Translates a free body to where its momentum and the load lead.
   void keep_momentum(MotionPoint& point) const;
+  /// Turns it, too.
+  void keep_both_momenta(MotionPoint& point) const;
 
   const MotionBody& body() const noexcept { return body_; }
   const MotionState& state() const noexcept { return state_; }
@@ -45,6 +57,8 @@ public:
   int evaluations() const noexcept { return evaluations_; }
 
 private:
+  Vec3 centre(std::span<const double> at) const;
+
   const MotionBody& body_;
   const MotionState& state_;
   SolidEnergy& energy_;

@@ -310,7 +310,7 @@ SolidStep SolidMotion::step(double h, const Context& context) {
     if (s.now.held[axis] == 0)
       s.reactions[axis] = 0;
   if (!s.now.any_held())
-    objective.keep_momentum(found);
+    objective.keep_both_momenta(found);
   s.energy.keep();
   Numbers acceleration(s.body.axes());
   for (std::size_t axis = 0; axis < s.body.axes(); ++axis) {
@@ -493,11 +493,10 @@ bool SolidMotion::keep_momentum(std::span<const double> forces, double room) {
   if (s.now.any_held())
     return true;
   State::Open& open = *s.open;
-  const std::array<double, 3> off = open.objective.momentum_off(open.found.at, forces);
-  if (!(std::hypot(off[0], off[1], off[2]) <= room))
+  const RigidChange by = open.objective.balance(open.found.at, forces);
+  if (!(by.largest <= room))
     return false;
-  for (std::size_t axis = 0; axis < s.body.axes(); ++axis)
-    open.found.at[axis] -= off[axis % 3];
+  open.objective.move(open.found, by);
   open.evaluated = false;
   return true;
 }
@@ -514,7 +513,7 @@ void SolidMotion::solve_alone(const Context& context) {
   open.evaluated = false;
   open.counts.factorisations = made;
   if (!s.now.any_held())
-    open.objective.keep_momentum(open.found);
+    open.objective.keep_both_momenta(open.found);
 }
 
 void SolidMotion::begin_iterate_again() {
