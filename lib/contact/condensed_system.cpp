@@ -8,6 +8,7 @@
 #include <algorithm>
 #include <cmath>
 #include <list>
+#include <map>
 #include <utility>
 
 namespace gewebe::contact {
@@ -30,6 +31,7 @@ struct Node {
 struct ActiveNode {
   std::uint32_t node = 0;
   std::array<std::int32_t, 3> unknown{-1, -1, -1};
+  std::uint32_t partner = none; ///< first body that the Hessian couples it with
 };
 
 constexpr std::size_t most_inverses = 32;
@@ -99,9 +101,9 @@ struct CondensedSystem::State {
   double reach = 1;                   ///< part of c that the step is to take
   double c = 1, way_energy = 0;
   CpuLevel cpu;
-  std::vector<std::uint32_t> part_of; ///< by unknown
-  std::vector<std::uint8_t> coupled;  ///< table of parts that the Hessian couples
-  VectorXd carried;                   ///< H_af p_f of immovable vertices
+  std::vector<std::uint32_t> node_of_unknown;        ///< active node
+  std::vector<std::array<std::uint32_t, 2>> coupled; ///< active nodes of two bodies
+  VectorXd carried;                                  ///< H_af p_f of immovable vertices
   VectorXd p;
   // Of energy(): quadratic in c, F and q.
   double ff = 0, fq = 0, qq = 0, rf = 0, rq = 0;
@@ -117,6 +119,42 @@ struct CondensedSystem::State {
   }
 
   std::size_t size() const { return static_cast<std::size_t>(matrix_order); }
+
+  /// The Hessian has an entry of two nodes.
+  void couple(const Node& a, const Node& b) {
+    if (a.body == b.body || a.active == none || b.active == none)
+      return;
+    for (const auto& [one, other] : {std::pair(&a, &b), std::pair(&b, &a)})
+      active[one->active].partner = std::min(active[one->active].partner, other->body);
+    coupled.push_back({a.active, b.active});
+  }
+
+  bool factor() {
+    // The nodes of a body fall into groups by the body that they touch: in a stack those of its top
+    // are coupled with those of its bottom and of the next bottom alone.
+    std::map<std::array<std::uint32_t, 2>, std::uint32_t> groups; // by body and partner
+    for (const ActiveNode& node : active)
+      groups.emplace(std::array{nodes[node.node].body, node.partner}, 0);
+    const std::size_t count = groups.size();
+    std::vector<std::uint8_t> near(count * count);
+    std::uint32_t next = 0;
+    for (auto& entry : groups)
+      entry.second = next++;
+    for (const auto& [a, i] : groups)
+      for (const auto& [b, j] : groups)
+        near[i * count + j] = a[0] == b[0] ? 1 : 0;
+    std::vector<std::uint32_t> group_of_node, group;
+    for (const ActiveNode& node : active)
+      group_of_node.push_back(groups.at({nodes[node.node].body, node.partner}));
+    for (const auto& [a, b] : coupled) {
+      const std::size_t i = group_of_node[a], j = group_of_node[b];
+      near[i * count + j] = near[j * count + i] = 1;
+    }
+    for (const std::uint32_t node : node_of_unknown)
+      group.push_back(group_of_node[node]);
+    return cache.state_->cholesky.factor(cache.state_->matrix, group, near, cpu);
+  }
+
   Index matrix_order = 0;
 
   std::uint32_t body_of(std::uint32_t vertex) const {
@@ -215,7 +253,7 @@ struct CondensedSystem::State {
         std::int32_t& unknown = node.unknown[static_cast<std::size_t>(a)];
         if (unknown < 0) {
           unknown = static_cast<std::int32_t>(matrix_order++);
-          part_of.push_back(nodes[node.node].body);
+          node_of_unknown.push_back(part.active[static_cast<std::size_t>(k)]);
         }
       }
     }
@@ -406,7 +444,9 @@ void CondensedSystem::clear_hessian() {
   State& s = *state_;
   s.cache.state_->hessian.assign(s.size() * s.size(), 0);
   s.carried.setZero(s.matrix_order);
-  s.coupled.assign(s.parts.size() * s.parts.size(), 0);
+  s.coupled.clear();
+  for (ActiveNode& node : s.active)
+    node.partner = none;
 }
 
 void CondensedSystem::add_hessian(std::span<const std::uint32_t> of,
@@ -418,11 +458,8 @@ void CondensedSystem::add_hessian(std::span<const std::uint32_t> of,
   for (std::size_t k = 0; k < of.size(); ++k) {
     const std::uint32_t place = s.place_of_vertex[of[k]];
     const Node& node = s.nodes[s.node_of[place]];
-    for (std::size_t j = 0; j < k; ++j) {
-      const std::uint32_t other = s.nodes[s.node_of[s.place_of_vertex[of[j]]]].body;
-      s.coupled[node.body * s.parts.size() + other] = 1;
-      s.coupled[other * s.parts.size() + node.body] = 1;
-    }
+    for (std::size_t j = 0; j < k; ++j)
+      s.couple(node, s.nodes[s.node_of[s.place_of_vertex[of[j]]]]);
     const Vec3 carried = -s.c * s.start[place];
     for (std::size_t a = 0; a < 3; ++a) {
       unknown[3 * k + a] = node.active == none ? -1 : s.active[node.active].unknown[a];
@@ -467,8 +504,7 @@ bool CondensedSystem::solve(std::span<const Vec3> gradient, double damping) {
     for (int a = 0; a < 3; ++a)
       if (const std::int32_t u = active.unknown[static_cast<std::size_t>(a)]; u >= 0)
         still.p[u] -= s.force[s.nodes[active.node].active][a];
-  if (order > 0 &&
-      !s.cache.state_->cholesky.factor(s.cache.state_->matrix, s.part_of, s.coupled, s.cpu))
+  if (order > 0 && !s.factor())
     return false;
   s.finish(still, true, false);
   s.finish(whole, false, true);
