@@ -1,11 +1,12 @@
 #include "contact/friction.h"
 
-#include "collision/feature_normal.h"
+#include "collision/surface_normal.h"
 #include "geometry/perpendicular.h"
 
 #include <cmath>
 #include <cstddef>
 #include <map>
+#include <utility>
 
 namespace gewebe::contact {
 
@@ -37,8 +38,8 @@ void set_tangents(FrictionPair& pair) {
   pair.tangent[1] = cross(pair.normal, pair.tangent[0]);
 }
 
-/// Weight of a surface's normal at an edge between triangles: 0.33 at 15 degrees, 0.01 at 30, 4e-5
-/// at 45.
+/// Weight of a surface's normal where its triangles are bent against each other: 0.33 at 15
+/// degrees, 0.01 at 30, 4e-5 at 45.
 double weight_of(double flat) {
   for (int k = 0; k < 7; ++k)
     flat *= flat;
@@ -50,14 +51,17 @@ constexpr double pair_weight = 0.003;
 
 /// Normal of the surfaces of a pair of vertices and edges. \pre pair.normal is the direction of its
 /// distance
-Vec3 surface_normal(const collision::CollisionSurface& surface, std::span<const Vec3> x,
-                    const FrictionPair& pair) {
+Vec3 normal_of_surfaces(const collision::CollisionSurface& surface, std::span<const Vec3> x,
+                        const FrictionPair& pair) {
   if (pair.count - pair.first > 2) // a triangle's own
     return pair.normal;
-  const std::span<const std::uint32_t> vertices(pair.vertex.data(), pair.count);
   Vec3 sum = pair_weight * pair.normal;
-  for (const auto& feature : {vertices.first(pair.first), vertices.subspan(pair.first)}) {
-    const collision::FeatureNormal n = collision::feature_normal(surface, x, feature, pair.normal);
+  const std::size_t first = pair.first;
+  for (const auto& [begin, count] :
+       {std::pair{std::size_t{0}, first}, {first, pair.count - first}}) {
+    const collision::SurfaceNormal n =
+        collision::surface_normal(surface, x, std::span(pair.vertex).subspan(begin, count),
+                                  std::span(pair.weight).subspan(begin, count), pair.normal);
     if (n.normal == Vec3{}) // a sphere or a capsule is smooth
       return pair.normal;
     sum += weight_of(n.flat) * n.normal;
@@ -118,7 +122,7 @@ void smooth_friction_pairs(const collision::CollisionSurface& surface, std::span
                            std::span<const Vec3> x_start, double stick_per_approach,
                            std::span<FrictionPair> pairs) {
   for (FrictionPair& pair : pairs) {
-    pair.normal = surface_normal(surface, x, pair);
+    pair.normal = normal_of_surfaces(surface, x, pair);
     set_tangents(pair);
     pair.added_stick =
         stick_per_approach * std::abs(dot(pair.normal, relative_displacement(pair, x, x_start)));
