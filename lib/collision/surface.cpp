@@ -47,6 +47,30 @@ void list_triangles_around(CollisionSurface& surface) {
       surface.triangles_around[next[vertex]++] = k;
 }
 
+/// \param sides  of all triangles, ascending, with repetitions
+void find_overlap(CollisionSurface& surface, std::span<const std::array<std::uint32_t, 2>> sides) {
+  const auto excess = [&](std::uint32_t a, std::uint32_t b) { // over one of an edge's triangles
+    const auto same = std::ranges::equal_range(sides, ascending(a, b));
+    const auto count = static_cast<double>(same.size());
+    return (count - 1) / count;
+  };
+  surface.overlap.clear();
+  std::vector<double> of_vertex(surface.size(), 1); // to be 1 in all
+  for (const auto& triangle : surface.triangles) {
+    std::array<double, 6>& overlap = surface.overlap.emplace_back();
+    for (std::size_t k = 0; k < 3; ++k)
+      overlap[k] = -excess(triangle[k], triangle[(k + 1) % 3]);
+    for (std::size_t k = 0; k < 3; ++k)
+      of_vertex[triangle[k]] -= 1 + overlap[k] + overlap[(k + 2) % 3];
+  }
+  for (std::size_t t = 0; t < surface.triangles.size(); ++t)
+    for (std::size_t k = 0; k < 3; ++k) {
+      const std::uint32_t vertex = surface.triangles[t][k];
+      surface.overlap[t][3 + k] =
+          of_vertex[vertex] / static_cast<double>(surface.triangles_of(vertex).size());
+    }
+}
+
 } // namespace
 
 void complete_surface(CollisionSurface& surface) {
@@ -68,6 +92,8 @@ void complete_surface(CollisionSurface& surface) {
   for (const auto& [a, b, c] : surface.triangles)
     sides.insert(sides.end(), {ascending(a, b), ascending(b, c), ascending(a, c)});
   std::sort(sides.begin(), sides.end());
+  list_triangles_around(surface);
+  find_overlap(surface, sides);
   sides.erase(std::unique(sides.begin(), sides.end()), sides.end());
   for (auto& [a, b] : surface.edges)
     if (a > b)
@@ -94,7 +120,6 @@ void complete_surface(CollisionSurface& surface) {
       if (of_edge[vertex] == 0)
         surface.lone_points.push_back(vertex);
     }
-  list_triangles_around(surface);
 }
 
 } // namespace gewebe::collision

@@ -34,6 +34,10 @@ struct CollisionSurface {
   std::vector<std::uint32_t> lone_points; ///< points of no edge
   /// Triangles of vertex v: triangles_around[first_around[v]] up to that of first_around[v + 1].
   std::vector<std::uint32_t> first_around, triangles_around;
+  /// By triangle: what its edges (k, k + 1), then its vertices count in a sum over triangles, so
+  /// that a closed flat surface counts once wherever a point is next to it (inclusion and
+  /// exclusion: less the edges, more the vertices). Empty: nothing.
+  std::vector<std::array<double, 6>> overlap;
 
   std::size_t size() const noexcept { return rest.size(); }
   bool is_fixed(std::uint32_t vertex) const { return !fixed.empty() && fixed[vertex] != 0; }
@@ -48,7 +52,8 @@ struct CollisionSurface {
 
 /// Completes a surface. Adds the edges of triangles, and makes `edges` ascending and unique.
 /// `points` becomes all vertices that are part of a primitive or were listed. `owner` and `radius`
-/// become 0 if they are empty. Fills lone_edges, lone_points and the triangles around vertices.
+/// become 0 if they are empty. Fills lone_edges, lone_points, the triangles
+/// around vertices, and their overlap.
 /// \throws Error if a vertex is out of range or used twice in a primitive, or lists of vertices
 /// differ in length
 void complete_surface(CollisionSurface& surface);

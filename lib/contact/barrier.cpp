@@ -189,7 +189,7 @@ void pair_hessian(const ContactPair& pair, std::span<const Vec3> x, double d_hat
     // By d instead of its square: grad d = g / (2 d), d2b/dd2 = 4 d^2 b'' + 2 b'.
     const double m = pair.eps_x > 0 ? collision::edge_edge_mollifier(edges(e.copy), pair.eps_x) : 1;
     const double curvature = e.b.second + e.b.first / (2 * e.closest.squared_distance);
-    const double factor = curvature > 0 ? scale * m * curvature : 0;
+    const double factor = curvature > 0 && scale > 0 ? scale * m * curvature : 0;
     for (std::size_t i = 0; i < n; ++i)
       for (std::size_t j = 0; j < n; ++j)
         h[i * n + j] = factor * (g[i] * g[j]);

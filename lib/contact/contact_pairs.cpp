@@ -3,6 +3,7 @@
 #include "collision/pair_feature.h"
 
 #include <algorithm>
+#include <cmath>
 #include <cstddef>
 #include <tuple>
 #include <type_traits>
@@ -52,6 +53,48 @@ ContactPair reduced(const ClosestFeature& feature, const std::array<std::uint32_
   return pair;
 }
 
+/// Adds the closest feature of a point and one feature of a triangle that is within range, with a
+/// weight.
+template <std::size_t n>
+void add_overlap(const std::array<std::uint32_t, n>& vertices, std::span<const Vec3> x,
+                 double weight, double d_min, double range, std::vector<ContactPair>& pairs) {
+  if (weight == 0)
+    return;
+  std::array<Vec3, n> y;
+  for (std::size_t k = 0; k < n; ++k)
+    y[k] = x[vertices[k]];
+  const ClosestFeature feature = collision::closest_feature(y, 1);
+  if (!(collision::squared_distance(feature, y) < range * range))
+    return;
+  ContactPair pair = reduced(feature, vertices);
+  pair.weight = weight;
+  pair.d_min = d_min;
+  pairs.push_back(pair);
+}
+
+/// Adds the edges and vertices of a triangle that a point is in contact with.
+void add_overlaps(const collision::CollisionSurface& surface,
+                  const std::array<std::uint32_t, 4>& vertices, std::span<const Vec3> x,
+                  double d_min, double range, std::vector<ContactPair>& pairs) {
+  const auto& [p, a, b, c] = vertices;
+  for (const std::uint32_t number : surface.triangles_of(a)) {
+    const auto& triangle = surface.triangles[number];
+    if (std::ranges::find(triangle, b) == triangle.end() ||
+        std::ranges::find(triangle, c) == triangle.end())
+      continue;
+    const std::array<double, 6>& overlap = surface.overlap[number];
+    for (std::size_t k = 0; k < 3; ++k) {
+      add_overlap(std::array{p, triangle[k], triangle[(k + 1) % 3]}, x, overlap[k], d_min, range,
+                  pairs);
+      add_overlap(std::array{p, triangle[k]}, x, overlap[3 + k], d_min, range, pairs);
+    }
+    return;
+  }
+}
+
+/// Of weights that cancel but for rounding.
+constexpr double no_weight = 1e-9;
+
 } // namespace
 
 void find_active_pairs(const collision::CollisionSurface& surface,
@@ -94,6 +137,9 @@ void find_active_pairs(const collision::CollisionSurface& surface,
         pair = reduced(feature, vertices);
       pair.d_min = d_min;
       pairs.push_back(pair);
+      if constexpr (n == 4)
+        if (first == 1 && !surface.overlap.empty())
+          add_overlaps(surface, vertices, x, d_min, range, pairs);
     }
   };
   look(candidates.point_point, 1);
@@ -118,6 +164,7 @@ void find_active_pairs(const collision::CollisionSurface& surface,
     else
       pairs[kept++] = pairs[k];
   pairs.resize(kept);
+  std::erase_if(pairs, [](const ContactPair& p) { return std::abs(p.weight) < no_weight; });
 }
 
 } // namespace gewebe::contact

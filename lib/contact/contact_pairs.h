@@ -1,6 +1,11 @@
 #pragma once
 // Active contact pairs: what of the candidates is closer than d_hat, reduced to closest features,
 // each once with a weight (NormalCollisions of ipc-toolkit with collision set type IPC).
+//
+// A point above an edge of a flat surface is near both triangles, one above a vertex near all around
+// it. Their sum would push the point aside. Edges are therefore subtracted and vertices added, so
+// that a surface counts once wherever the point is (Li and others, Convergent incremental potential
+// contact, arXiv 2307.15908, 2023). Weights of concave edges are negative.
 
 #include "collision/candidates.h"
 #include "collision/distance.h"
@@ -20,7 +25,7 @@ struct ContactPair {
   collision::ClosestFeature feature; ///< in terms of `vertex`
   std::uint8_t count = 0;            ///< vertices: 2 to 4
   std::array<std::uint32_t, 4> vertex{};
-  double weight = 1; ///< number of candidates that reduce to this pair
+  double weight = 1; ///< number of candidates that reduce to this pair, less the overlap
   double d_min = 0;  ///< sum of both radii, mm
   double eps_x = 0;  ///< threshold of the mollifier; 0: edges are not nearly parallel
 };

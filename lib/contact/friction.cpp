@@ -113,7 +113,7 @@ void lag_friction(const collision::CollisionSurface& surface, const ContactPairs
                                        barrier_range(pairs.d_hat, pair.d_min));
     lagged.normal_force = -kappa * pair.weight * value.first * 2 * distance;
     lagged.limit = mu * lagged.normal_force;
-    if (lagged.limit > 0 && std::isfinite(lagged.limit))
+    if (lagged.limit != 0 && std::isfinite(lagged.limit))
       result.push_back(lagged);
   }
 }
@@ -178,6 +178,8 @@ void friction_hessian(std::span<const FrictionPair> pairs, std::span<const Vec3>
     HessianBlock& block = blocks[p];
     block.count = pair.count;
     block.vertex = pair.vertex;
+    // Overlap is negative: without it the Hessian is positive semidefinite.
+    const double limit = mode == HessianMode::exact || pair.limit > 0 ? pair.limit : 0;
     const Plane u = slip(pair, x, x_start);
     const FrictionValue f = smooth_friction(length(u), e + pair.added_stick);
     // limit T (f0'/u 1 + second (v u^T + u v^T) / 2) T^T. With v = u its eigenvalues are f0'/u
@@ -196,7 +198,7 @@ void friction_hessian(std::span<const FrictionPair> pairs, std::span<const Vec3>
         const double s = pair.tangent[0][i], t = pair.tangent[1][i];
         const double a = pair.tangent[0][j], b = pair.tangent[1][j];
         h[static_cast<std::size_t>(i)][static_cast<std::size_t>(j)] =
-            pair.limit * (m[0] * (s * a) + m[1] * (s * b + t * a) + m[2] * (t * b));
+            limit * (m[0] * (s * a) + m[1] * (s * b + t * a) + m[2] * (t * b));
       }
     const std::size_t n = 3 * std::size_t{pair.count};
     for (std::size_t i = 0; i < n; ++i)

@@ -27,7 +27,7 @@ struct FrictionPair {
   std::array<double, 4> weight{}; ///< relative displacement = sum of weight times displacement
   std::array<Vec3, 2> tangent;    ///< orthonormal
   Vec3 normal;                    ///< unit, towards the vertices of positive weight
-  double normal_force = 0;        ///< lambda with the pair's weight
+  double normal_force = 0;        ///< lambda with the pair's weight, which may be negative
   double limit = 0;               ///< mu times normal_force
   double added_stick = 0;         ///< to e
   /// Dual variable of primal-dual iterations: the friction force over the limit, as the last step
@@ -75,10 +75,11 @@ void friction_forces(std::span<const FrictionPair> pairs, std::span<const Vec3> 
                      std::span<const Vec3> x_start, double e,
                      std::vector<std::array<Vec3, 4>>& forces);
 
-/// Blocks of the Hessian, which is positive semidefinite. Where it is not to be exact, that of the
-/// primal-dual method (Chan, Golub, Mulet, SIAM J. Sci. Comput. 20(6), 1999): along the slip it has
-/// the dual in place of the force's direction, and so becomes soft only where the force has come to
-/// stay. Newton's steps with the exact one throw pairs to and fro. \param blocks  overwritten
+/// Blocks of the Hessian, which is positive semidefinite but for pairs of negative weight. Where it
+/// is not to be exact, these are left out, and it is that of the primal-dual method (Chan, Golub,
+/// Mulet, SIAM J. Sci. Comput. 20(6), 1999): along the slip it has the dual in place of the force's
+/// direction, and so becomes soft only where the force has come to stay. Newton's steps with the
+/// exact one throw pairs to and fro. \param blocks  overwritten
 void friction_hessian(std::span<const FrictionPair> pairs, std::span<const Vec3> x,
                       std::span<const Vec3> x_start, double e, HessianMode mode,
                       std::vector<HessianBlock>& blocks);

@@ -22,8 +22,10 @@ using collision::BroadPhase;
 using collision::Candidates;
 using collision::CollisionSurface;
 
-ContactPairs pairs_of(const CollisionSurface& surface, const std::vector<Vec3>& x, double d_hat,
+/// As in the paper: triangles overlap.
+ContactPairs pairs_of(CollisionSurface surface, const std::vector<Vec3>& x, double d_hat,
                       bool self = false) {
+  surface.overlap.clear();
   AllowedPairs allowed(4, 1);
   for (std::size_t k = 0; k < 4; ++k)
     allowed.set(k, k, self ? 1 : 0);
