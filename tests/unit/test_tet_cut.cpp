@@ -200,6 +200,18 @@ TEST(TetCut, AnglesStayWithinTheirBound) {
     }
 }
 
+/// Parts of tetrahedra that are sharper than the bound may be as sharp as these.
+TEST(TetCut, TetrahedraThatAreSharpAlreadyAreSplit) {
+  TetMesh mesh = box_tetrahedra(6, 6, 6, 1.0 / 6);
+  for (Vec3& p : mesh.points)
+    p.z *= 0.08; // dihedral angles of 5 degrees
+  const BladeCutOptions options{0, 10, {}, {}};
+  const TetCut cut =
+      cut_tetrahedra(mesh, blade_strip({2.5 / 6, 0.5, 0.04}, {0, 3, 0}, {0, 0, 3}), options);
+  EXPECT_EQ(fault_of(mesh, cut, options.least_angle), "");
+  EXPECT_GT(cut.report.split, 20U);
+}
+
 // ---- Blades that end in the tissue, one after the other
 
 TEST(TetCut, ABladeThatEndsInsideLeavesTheFrontJoined) {
