@@ -76,9 +76,9 @@ struct Parameters {
   double lag_tolerance = 5e-3;
   /// Largest last change of a round, over d_hat.
   double round_tolerance = 0.5;
-  /// Part of the smallest gap (at most of d_hat) by which bodies may be translated at the end, so
-  /// that momentum is exact; forces change by twice as much.
-  double momentum_room = 2e-3;
+  /// Parts of d_hat and of the smallest gap by which free bodies may be moved at the end, so that
+  /// their momenta are exact; where the gap is a third of d_hat, forces change by 0.5 %.
+  double momentum_room = 1e-3, momentum_gap = 0.1;
   /// Part of the gap (at most of d_hat) that a step may not use up: it would land deep in the
   /// barrier.
   double kept_gap = 0.5;

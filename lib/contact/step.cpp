@@ -340,8 +340,9 @@ bool StepSolver::Work::iterate(CondensedSystem& system, int iteration, bool& con
 /// \return whether these are right
 bool StepSolver::Work::move_bodies(const CondensedSystem& system, bool ends) {
   find_pairs(at_);
+  const Parameters& p = options_.parameters;
   const double room =
-      options_.parameters.momentum_room * std::min(d_hat_, smallest_gap(energy_.pairs(), at_));
+      std::min(p.momentum_room * d_hat_, p.momentum_gap * smallest_gap(energy_.pairs(), at_));
   bool exact = true;
   for (std::size_t b = 0; b < island_.table.bodies.size(); ++b) {
     ContactBody& body = *island_.table.bodies[b];
