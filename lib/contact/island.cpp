@@ -1,6 +1,9 @@
 #include "contact/island.h"
 
 #include "collision/bvh.h"
+#include "collision/candidates.h"
+#include "contact/barrier.h"
+#include "contact/contact_pairs.h"
 #include "contact/convex_core.h"
 #include "contact/fit_radii.h"
 
@@ -33,13 +36,15 @@ double median_edge(const collision::CollisionSurface& surface) {
   return *middle;
 }
 
-/// Whether the segment pq passes the inside of a triangle; touching is no passing.
-bool passes(const Vec3& p, const Vec3& q, const Vec3& a, const Vec3& b, const Vec3& c) {
+/// Whether the segment pq passes the inside of a triangle, and both ends are farther than `depth`
+/// from its plane; touching is no passing.
+bool passes(const Vec3& p, const Vec3& q, const Vec3& a, const Vec3& b, const Vec3& c,
+            double depth) {
   const auto volume = [](const Vec3& u, const Vec3& v, const Vec3& s, const Vec3& t) {
     return dot(cross(v - u, s - u), t - u);
   };
   const double up = volume(a, b, c, p), uq = volume(a, b, c, q);
-  if (!(up * uq < 0))
+  if (!(up * uq < 0) || !(std::min(std::abs(up), std::abs(uq)) > depth * norm(cross(b - a, c - a))))
     return false;
   const double ab = volume(p, q, a, b), bc = volume(p, q, b, c), ca = volume(p, q, c, a);
   return (ab > 0 && bc > 0 && ca > 0) || (ab < 0 && bc < 0 && ca < 0);
@@ -214,8 +219,7 @@ void IslandMotion::advance(Members members, double from, double to, const Contex
   advance_parts(members, from, to, max_halvings, context);
 }
 
-std::optional<std::array<std::uint32_t, 5>>
-IslandMotion::find_intersection(std::span<const Vec3> x) const {
+std::optional<Vec3> IslandMotion::find_intersection(std::span<const Vec3> x, double depth) const {
   const collision::CollisionSurface& surface = island_->surface;
   std::vector<Box3> boxes;
   for (const auto& t : surface.triangles) {
@@ -224,8 +228,8 @@ IslandMotion::find_intersection(std::span<const Vec3> x) const {
       box.add(x[v]);
   }
   const collision::Bvh tree(boxes);
-  std::optional<std::array<std::uint32_t, 5>> found;
   for (const auto& [a, b] : surface.edges) {
+    bool found = false;
     Box3 box;
     box.add(x[a]);
     box.add(x[b]);
@@ -234,13 +238,28 @@ IslandMotion::find_intersection(std::span<const Vec3> x) const {
       if (found || island_->allowed.at(surface.owner[a], surface.owner[t[0]]) == 0 ||
           std::ranges::any_of(t, [&](std::uint32_t v) { return v == a || v == b; }))
         return;
-      if (passes(x[a], x[b], x[t[0]], x[t[1]], x[t[2]]))
-        found = {a, b, t[0], t[1], t[2]};
+      found = passes(x[a], x[b], x[t[0]], x[t[1]], x[t[2]], depth);
     });
     if (found)
-      break;
+      return (x[a] + x[b]) / 2;
   }
-  return found;
+  return std::nullopt;
+}
+
+std::optional<Vec3> IslandMotion::find_touching(std::span<const Vec3> x) const {
+  collision::Candidates candidates;
+  const double reach = island_->activation_distance;
+  collision::BroadPhase(island_->surface)
+      .find(island_->surface, x, x, reach, island_->allowed, candidates);
+  ContactPairs all, one;
+  find_active_pairs(island_->surface, candidates, x, reach, all);
+  one.d_hat = reach;
+  for (const ContactPair& pair : all.pairs) {
+    one.pairs = {pair};
+    if (!(smallest_gap(one, x) > 0))
+      return x[pair.vertex[0]];
+  }
+  return std::nullopt;
 }
 
 } // namespace gewebe::contact

@@ -89,9 +89,11 @@ public:
   void advance(std::span<IslandMember* const> members, double from, double to,
                const Context& context);
 
-  /// Positions of all vertices as members stand at `from`, and which edges pass triangles there:
-  /// the vertices of the first such pair, or nothing.
-  std::optional<std::array<std::uint32_t, 5>> find_intersection(std::span<const Vec3> x) const;
+  /// Where an edge passes through a triangle. \param x  positions of all vertices
+  /// \param depth  least distance of both ends of the edge from the triangle's plane, mm
+  std::optional<Vec3> find_intersection(std::span<const Vec3> x, double depth) const;
+  /// Where surfaces touch, so that no step can begin.
+  std::optional<Vec3> find_touching(std::span<const Vec3> x) const;
   const Island& island() const noexcept { return *island_; }
 
   /// What has been done since the last call.

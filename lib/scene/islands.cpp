@@ -510,7 +510,7 @@ void part_walls(World& w, const SetContact& c) {
 } // namespace
 
 void Rule<SetContact>::apply(World& w, const SetContact& c) {
-  require_apart(w, {c.object, c.other, c.friction});
+  require_apart(w, {c.object, c.other, c.friction}, true);
   part_walls(w, c);
   const auto known = std::ranges::find_if(w.now.contacts, [&](const ContactRule& rule) {
     return std::minmax(rule.object, rule.other) == std::minmax(c.object, c.other);

@@ -491,6 +491,12 @@ void move_all(World& w, std::size_t index, const Moves& moves, std::deque<Object
       }))
     separate_walls(w, moves.objects, motions);
   renew_bodies(w, motions);
+  // Walls of wounds in a strained body may pass other surfaces.
+  for (const ContactRule& rule : w.now.contacts)
+    if (std::ranges::any_of(moves.objects, [&](std::size_t object) {
+          return rule.object == object || rule.other == object;
+        }))
+      require_apart(w, rule, false);
 }
 
 } // namespace gewebe::simulation

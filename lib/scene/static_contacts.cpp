@@ -463,7 +463,7 @@ Pose entry_pose(World& w, const InstrumentShape& shape, const Pose& pose) {
   return start;
 }
 
-void require_apart(World& w, const ContactRule& rule) {
+void require_apart(World& w, const ContactRule& rule, bool strictly) {
   std::vector<std::size_t> objects{rule.object};
   if (rule.other != rule.object)
     objects.push_back(rule.other);
@@ -479,10 +479,13 @@ void require_apart(World& w, const ContactRule& rule) {
   collision::OwnerTable<double> table(objects.size(), -1);
   table.set(0, objects.size() - 1, 0);
   const contact::IslandMotion motion(surfaces, table);
-  const auto found = motion.find_intersection(x);
+  std::optional<Vec3> found =
+      motion.find_intersection(x, strictly ? 0 : motion.activation_distance());
+  if (!found && !strictly)
+    found = motion.find_touching(x);
   if (!found)
     return;
-  const Vec3 at = (x[(*found)[0]] + x[(*found)[1]]) / 2;
+  const Vec3& at = *found;
   const std::string& one = w.now.objects[rule.object].name();
   throw Error((rule.object == rule.other
                    ? "the surface of object " + one + " passes itself"

@@ -23,7 +23,7 @@ namespace {
 /// Distance by which each side is moved, over the activation distance of contact: together they
 /// stand apart by a bit more than a half of it.
 constexpr double moved_apart = 0.3;
-/// Difference of two unit normals below which both sides face alike: sheets.
+/// Difference of two unit directions below which both sides face alike.
 constexpr double least_difference = 0.1;
 
 /// A node of a surface.
@@ -32,7 +32,7 @@ struct SurfaceNode {
   std::uint32_t node = 0;
   Vec3 place;
   Vec3 normal; ///< unit, outward
-  Vec3 inward; ///< unit, towards the triangles around
+  Vec3 inward; ///< at a rim: unit, between the perpendiculars of both of its edges
   bool held = false;
   bool beside_free = false; ///< a triangle around has a node that is not held
 };
@@ -101,6 +101,10 @@ private:
   void add(const Object& object, std::size_t index, const Motions& motions) {
     const Model& model = object.model();
     std::map<std::uint32_t, SurfaceNode> nodes;
+    std::map<std::pair<std::uint32_t, std::uint32_t>, int> triangles_of_edge;
+    for (const Triangle& t : model.triangles)
+      for (std::size_t k = 0; k < 3; ++k)
+        ++triangles_of_edge[std::minmax(t[k], t[(k + 1) % 3])];
     const auto place = [&](std::uint32_t node) {
       return model.nodes[node].position + displacement_of(object, motions, index, node);
     };
@@ -111,13 +115,19 @@ private:
       const bool has_free = !std::ranges::all_of(t, is_held);
       const std::array<Vec3, 3> x{place(t[0]), place(t[1]), place(t[2])};
       const Vec3 area = cross(x[1] - x[0], x[2] - x[0]);
-      const Vec3 middle = (x[0] + x[1] + x[2]) / 3;
       for (std::size_t k = 0; k < 3; ++k) {
         SurfaceNode& node = nodes[t[k]];
         node.normal += area;
-        node.inward += norm(area) * unit(middle - x[k]);
         node.beside_free = node.beside_free || has_free;
         edges_.push_back(norm(model.nodes[t[(k + 1) % 3]].position - model.nodes[t[k]].position));
+      }
+      for (std::size_t k = 0; k < 3; ++k) {
+        const std::uint32_t a = t[k], b = t[(k + 1) % 3];
+        if (triangles_of_edge.at(std::minmax(a, b)) > 1)
+          continue;
+        const Vec3 across = unit(cross(area, x[(k + 1) % 3] - x[k]));
+        nodes[a].inward += across;
+        nodes[b].inward += across;
       }
     }
     for (auto& [number, node] : nodes) {
@@ -135,17 +145,20 @@ private:
   std::vector<double> edges_;
 };
 
-/// Directions in which nodes at one place part.
+/// Directions in which nodes at one place part: at rims of sheets along these, else against the
+/// surface's normal.
 std::vector<Vec3> parting_directions(std::span<const SurfaceNode> group) {
   const auto count = static_cast<double>(group.size());
   Vec3 normal, inward;
+  bool rims = true;
   for (const SurfaceNode& node : group) {
     normal += node.normal / count;
     inward += node.inward / count;
+    rims = rims && node.inward != Vec3{};
   }
   std::vector<Vec3> directions;
   for (const SurfaceNode& node : group) {
-    const Vec3 off = normal - node.normal;
+    const Vec3 off = rims ? node.inward - inward : normal - node.normal;
     directions.push_back(unit(norm(off) >= least_difference ? off : node.inward - inward));
   }
   return directions;
