@@ -92,7 +92,7 @@ void add_overlaps(const collision::CollisionSurface& surface,
   }
 }
 
-/// Of weights that cancel but for rounding.
+/// Weights below this part are rounding: they cancel.
 constexpr double no_weight = 1e-9;
 
 } // namespace

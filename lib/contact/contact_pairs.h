@@ -2,10 +2,10 @@
 // Active contact pairs: what of the candidates is closer than d_hat, reduced to closest features,
 // each once with a weight (NormalCollisions of ipc-toolkit with collision set type IPC).
 //
-// A point above an edge of a flat surface is near both triangles, one above a vertex near all around
-// it. Their sum would push the point aside. Edges are therefore subtracted and vertices added, so
-// that a surface counts once wherever the point is (Li and others, Convergent incremental potential
-// contact, arXiv 2307.15908, 2023). Weights of concave edges are negative.
+// A point above an edge of a flat surface is near both triangles, one above a vertex near all
+// around it. Their sum would push the point aside. Edges are therefore subtracted and vertices
+// added, so that a surface counts once wherever the point is (Li and others, Convergent incremental
+// potential contact, arXiv 2307.15908, 2023). Weights of concave edges are negative.
 
 #include "collision/candidates.h"
 #include "collision/distance.h"

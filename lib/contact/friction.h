@@ -75,11 +75,11 @@ void friction_forces(std::span<const FrictionPair> pairs, std::span<const Vec3> 
                      std::span<const Vec3> x_start, double e,
                      std::vector<std::array<Vec3, 4>>& forces);
 
-/// Blocks of the Hessian, which is positive semidefinite but for pairs of negative weight. Where it
-/// is not to be exact, these are left out, and it is that of the primal-dual method (Chan, Golub,
-/// Mulet, SIAM J. Sci. Comput. 20(6), 1999): along the slip it has the dual in place of the force's
-/// direction, and so becomes soft only where the force has come to stay. Newton's steps with the
-/// exact one throw pairs to and fro. \param blocks  overwritten
+/// Blocks of the Hessian, which is positive semidefinite except for pairs of negative weight. Where
+/// it is not to be exact, these are left out, and it is that of the primal-dual method (Chan,
+/// Golub, Mulet, SIAM J. Sci. Comput. 20(6), 1999): along the slip it has the dual in place of the
+/// force's direction, and so becomes soft only where the force has come to stay. Newton's steps
+/// with the exact one throw pairs to and fro. \param blocks  overwritten
 void friction_hessian(std::span<const FrictionPair> pairs, std::span<const Vec3> x,
                       std::span<const Vec3> x_start, double e, HessianMode mode,
                       std::vector<HessianBlock>& blocks);
