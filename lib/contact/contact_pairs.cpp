@@ -138,7 +138,7 @@ void find_active_pairs(const collision::CollisionSurface& surface,
       pair.d_min = d_min;
       pairs.push_back(pair);
       if constexpr (n == 4)
-        if (first == 1 && !surface.overlap.empty())
+        if (first == 1 && d_min == 0 && !surface.overlap.empty())
           add_overlaps(surface, vertices, x, d_min, range, pairs);
     }
   };

@@ -5,7 +5,8 @@
 // A point above an edge of a flat surface is near both triangles, one above a vertex near all
 // around it. Their sum would push the point aside. Edges are therefore subtracted and vertices
 // added, so that a surface counts once wherever the point is (Li and others, Convergent incremental
-// potential contact, arXiv 2307.15908, 2023). Weights of concave edges are negative.
+// potential contact, arXiv 2307.15908, 2023). Weights of concave edges are negative. Surfaces with
+// a radius are smooth and turn little within d_hat: there each triangle counts.
 
 #include "collision/candidates.h"
 #include "collision/distance.h"

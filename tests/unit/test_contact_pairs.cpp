@@ -2,6 +2,7 @@
 
 #include "collision/candidates.h"
 #include "contact/barrier.h"
+#include "larger.h"
 
 #include <algorithm>
 #include <cmath>
@@ -116,7 +117,7 @@ TEST(ContactPairs, BentSurfacesPushAndAreContinuous) {
       const double energy = add_barrier_gradient(pairs_of(surface), surface.rest, 1, gradient);
       EXPECT_LT(gradient[25].z, 0) << "not pushed";
       if (k > 0)
-        most = std::abs(energy - before) > most ? std::abs(energy - before) : most;
+        most = test::larger(most, std::abs(energy - before));
       before = energy;
     }
     const double whole = barrier(0.05 * 0.05, barrier_range(d_hat, 0)).value;
