@@ -15,11 +15,14 @@ struct SurfaceNormal {
   double flat = 0; ///< |sum of area normals| over the sum of areas: 1 where triangles are coplanar
 };
 
-/// Normal at a point of a vertex, an edge or a triangle, interpolated between those of the
-/// vertices, which average the triangles around them. The weight of a triangle is its area times |n
-/// . direction|^8, and normals that point away from `direction` are reversed: the far side of a rim
-/// and the back of a sheet do not count. \param vertices,weights  the point is the sum of weight
-/// times vertex; sizes of weights count \param direction  unit
+/// Normal at a point of a vertex, an edge or a triangle: interpolated between vertices, where it is
+/// the average of the triangles around.
+///
+/// A triangle has the weight area |n . direction|^8, and n is reversed where it points away from
+/// `direction`: the far side of a rim and the back of a sheet do not count.
+///
+/// \param vertices,weights  the point is the sum of weight times vertex; signs do not matter
+/// \param direction  unit
 SurfaceNormal surface_normal(const CollisionSurface& surface, std::span<const Vec3> x,
                              std::span<const std::uint32_t> vertices,
                              std::span<const double> weights, const Vec3& direction);

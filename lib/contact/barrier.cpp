@@ -268,11 +268,13 @@ void barrier_hessian(const ContactPairs& pairs, std::span<const Vec3> x, double 
     pair_hessian(pairs.pairs[k], x, pairs.d_hat, kappa, mode, blocks[k]);
 }
 
-double smallest_gap(const ContactPairs& pairs, std::span<const Vec3> x) {
-  double least = infinity;
+SmallestGap find_smallest_gap(const ContactPairs& pairs, std::span<const Vec3> x) {
+  SmallestGap least{infinity, {}};
   for (const ContactPair& pair : pairs.pairs) {
     const Evaluated e = evaluate(pair, x, pairs.d_hat);
-    least = smaller(least, std::sqrt(e.closest.squared_distance) - pair.d_min);
+    const double gap = std::sqrt(e.closest.squared_distance) - pair.d_min;
+    if (!std::isnan(least.gap) && !(gap >= least.gap)) // a NaN stays
+      least = {gap, x[pair.vertex[pair.count - std::size_t{1}]]};
   }
   return least;
 }

@@ -58,7 +58,14 @@ struct HessianBlock {
 void barrier_hessian(const ContactPairs& pairs, std::span<const Vec3> x, double kappa,
                      HessianMode mode, std::vector<HessianBlock>& blocks);
 
-/// Smallest gap d - d_min of the pairs; +inf without any.
-double smallest_gap(const ContactPairs& pairs, std::span<const Vec3> x);
+/// Smallest gap d - d_min of the pairs, and a vertex of that pair; +inf without any.
+struct SmallestGap {
+  double gap = 0;
+  Vec3 position;
+};
+SmallestGap find_smallest_gap(const ContactPairs& pairs, std::span<const Vec3> x);
+inline double smallest_gap(const ContactPairs& pairs, std::span<const Vec3> x) {
+  return find_smallest_gap(pairs, x).gap;
+}
 
 } // namespace gewebe::contact

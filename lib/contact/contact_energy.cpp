@@ -95,21 +95,6 @@ void ContactEnergy::advance_duals(std::span<const Vec3> x, std::span<const Vec3>
   contact::advance_duals(friction_, x, to, begin_, stick_, part);
 }
 
-std::pair<double, Vec3> ContactEnergy::nearest(std::span<const Vec3> x) const {
-  double least = std::numeric_limits<double>::infinity();
-  Vec3 place;
-  for (const ContactPair& pair : pairs_.pairs) {
-    ContactPairs one;
-    one.d_hat = d_hat_;
-    one.pairs = {pair};
-    if (const double gap = smallest_gap(one, x); !(gap >= least)) {
-      least = gap;
-      place = x[pair.vertex[pair.count - std::size_t{1}]];
-    }
-  }
-  return {least, place};
-}
-
 void ContactEnergy::damp_lag(std::span<const FrictionPair> before) {
   const auto key = [](const FrictionPair& pair) { return std::pair(pair.count, pair.vertex); };
   std::map<std::pair<std::uint8_t, std::array<std::uint32_t, 4>>, double> forces;
@@ -128,7 +113,7 @@ void ContactEnergy::lag(std::span<const Vec3> x, bool damped) {
     return;
   const std::vector<FrictionPair> before = friction_;
   lag_friction(island_.surface, pairs_, x, kappa_, island_.friction, friction_);
-  smooth_friction_pairs(island_.surface, x, begin_, parameters_.stick_per_approach, friction_);
+  align_friction(island_.surface, x, begin_, parameters_.stick_per_approach, friction_);
   keep_duals(before, friction_);
   ++lags_;
   if (damped)

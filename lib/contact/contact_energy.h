@@ -46,8 +46,6 @@ public:
   void assemble(std::span<const Vec3> x, HessianMode mode, CondensedSystem& system);
   /// A part of the step with the last such Hessian, from x to `to`, is taken.
   void advance_duals(std::span<const Vec3> x, std::span<const Vec3> to, double part);
-  /// Smallest gap of the pairs and where it is; infinite without pairs.
-  std::pair<double, Vec3> nearest(std::span<const Vec3> x) const;
 
   /// Renews the normal forces and tangent planes of friction. \param damped  normal forces take
   /// half of their change: where friction itself brings them forth, whole changes may alternate for

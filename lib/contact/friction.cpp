@@ -38,7 +38,7 @@ void set_tangents(FrictionPair& pair) {
   pair.tangent[1] = cross(pair.normal, pair.tangent[0]);
 }
 
-/// Weight of a surface's normal where its triangles are bent against each other: 0.33 at 15
+/// Weight of a surface's normal at an edge, by the angle between its triangles: 0.33 at 15
 /// degrees, 0.01 at 30, 4e-5 at 45.
 double weight_of(double flat) {
   for (int k = 0; k < 7; ++k)
@@ -118,9 +118,9 @@ void lag_friction(const collision::CollisionSurface& surface, const ContactPairs
   }
 }
 
-void smooth_friction_pairs(const collision::CollisionSurface& surface, std::span<const Vec3> x,
-                           std::span<const Vec3> x_start, double stick_per_approach,
-                           std::span<FrictionPair> pairs) {
+void align_friction(const collision::CollisionSurface& surface, std::span<const Vec3> x,
+                    std::span<const Vec3> x_start, double stick_per_approach,
+                    std::span<FrictionPair> pairs) {
   for (FrictionPair& pair : pairs) {
     pair.normal = normal_of_surfaces(surface, x, pair);
     set_tangents(pair);

@@ -51,9 +51,9 @@ void lag_friction(const collision::CollisionSurface& surface, const ContactPairs
 /// against each other times the approach of both surfaces in the step: smaller slip has no fully
 /// developed friction. Otherwise the direction of friction in an impact is that of noise.
 /// \param stick_per_approach  that tilt
-void smooth_friction_pairs(const collision::CollisionSurface& surface, std::span<const Vec3> x,
-                           std::span<const Vec3> x_start, double stick_per_approach,
-                           std::span<FrictionPair> pairs);
+void align_friction(const collision::CollisionSurface& surface, std::span<const Vec3> x,
+                    std::span<const Vec3> x_start, double stick_per_approach,
+                    std::span<FrictionPair> pairs);
 
 /// f0, f0' / u and (f0'' - f0' / u) / u^2 at u, for e > 0.
 struct FrictionValue {

@@ -251,14 +251,10 @@ std::optional<Vec3> IslandMotion::find_touching(std::span<const Vec3> x) const {
   const double reach = island_->activation_distance;
   collision::BroadPhase(island_->surface)
       .find(island_->surface, x, x, reach, island_->allowed, candidates);
-  ContactPairs all, one;
-  find_active_pairs(island_->surface, candidates, x, reach, all);
-  one.d_hat = reach;
-  for (const ContactPair& pair : all.pairs) {
-    one.pairs = {pair};
-    if (!(smallest_gap(one, x) > 0))
-      return x[pair.vertex[0]];
-  }
+  ContactPairs pairs;
+  find_active_pairs(island_->surface, candidates, x, reach, pairs);
+  if (const SmallestGap least = find_smallest_gap(pairs, x); !(least.gap > 0))
+    return least.position;
   return std::nullopt;
 }
 

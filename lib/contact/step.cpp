@@ -183,8 +183,8 @@ void StepSolver::Work::search(std::span<const Vec3> from, std::span<const Vec3> 
 void StepSolver::Work::require_apart() const {
   if (energy_.pairs().pairs.empty())
     return;
-  if (const auto [gap, place] = energy_.nearest(at_); !(gap > 0))
-    throw IntersectsAtStart("contact: surfaces intersect near " + place_text(place));
+  if (const SmallestGap least = find_smallest_gap(energy_.pairs(), at_); !(least.gap > 0))
+    throw IntersectsAtStart("contact: surfaces intersect near " + place_text(least.position));
 }
 
 /// The chosen step of the system; trial_ becomes its end.
@@ -204,7 +204,7 @@ StepSolver::Work::Step StepSolver::Work::take_step(const CondensedSystem& system
   result.free = candidates_.free_part(at_, trial_);
   if (!(result.free > stuck))
     throw NotSolved("contact: a prescribed motion meets fixed nodes near " +
-                    place_text(energy_.nearest(at_).second));
+                    place_text(find_smallest_gap(energy_.pairs(), at_).position));
   return result;
 }
 

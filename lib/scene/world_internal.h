@@ -188,9 +188,12 @@ std::vector<std::uint8_t> show_static_contacts(World& w);
 std::vector<std::size_t> together(const World& w, std::size_t object);
 /// Start pose of an instrument that appears at `pose`: outside of all objects.
 Pose entry_pose(World& w, const InstrumentShape& shape, const Pose& pose);
-/// \param strictly  false: of a wound whose walls have been parted. They may pass each other by up
-/// to the activation distance of contact, but not touch \throw Error naming objects and position if
-/// surfaces that may touch intersect each other
+/// Requires that surfaces that may touch do not intersect.
+///
+/// \param strictly  false: behind a cut, whose walls have been parted. They may intersect by up to
+/// the activation distance of contact, but not touch
+///
+/// \throw Error naming objects and position
 void require_apart(World& w, const ContactRule& rule, bool strictly);
 
 // time.cpp: steps through events

@@ -102,7 +102,17 @@ TEST(ContactPairs, WithoutOverlapAPointAboveAVertexIsPushedAside) {
   EXPECT_GT(std::hypot(gradient[25].x, gradient[25].y), 0.1 * std::abs(gradient[25].z));
 }
 
-TEST(ContactPairs, BentSurfacesPushAndAreContinuous) {
+TEST(ContactPairs, WithARadiusEachTriangleCounts) {
+  const auto valley = [](double x, double) { return 0.05 * std::abs(x - 2); };
+  CollisionSurface surface = sheet_and_point({2, 1.7, 0.25}, valley);
+  surface.radius[25] = 0.2;
+  const ContactPairs pairs = pairs_of(surface);
+  EXPECT_GE(pairs.pairs.size(), 2U);
+  for (const ContactPair& pair : pairs.pairs)
+    EXPECT_GE(pair.weight, 1);
+}
+
+TEST(ContactPairs, RidgesAndValleysPushAndAreContinuous) {
   for (const double slope : {-0.5, -0.05, 0.05, 0.5}) {
     const auto roof = [&](double x, double) { return slope * std::abs(x - 2); };
     double before = 0, most = 0;

@@ -247,7 +247,7 @@ TEST(Friction, AnApproachOfFlatSurfacesSlipsNowhere) {
     std::vector<Vec3> start = x;
     for (std::size_t k = 16; k < 32; ++k)
       start[k].z += 0.4;
-    smooth_friction_pairs(all.surface, x, start, 0.1, all.pairs);
+    align_friction(all.surface, x, start, 0.1, all.pairs);
     ASSERT_GE(all.pairs.size(), 16U);
     std::vector<Vec3> gradient(x.size());
     std::vector<double> normal_force(x.size());
@@ -285,7 +285,7 @@ TEST(Friction, SharpEdgesAndInstrumentsKeepTheDirectionOfTheirDistance) {
   lag_friction(surface, contact, x, 2, FrictionTable(3, 0.5), pairs);
   ASSERT_GE(pairs.size(), 2U);
   smoothed = pairs;
-  smooth_friction_pairs(surface, x, x, 0.1, smoothed);
+  align_friction(surface, x, x, 0.1, smoothed);
   for (std::size_t k = 0; k < pairs.size(); ++k) {
     EXPECT_LT(norm(smoothed[k].normal - pairs[k].normal), 1e-6);
     EXPECT_EQ(smoothed[k].added_stick, 0);

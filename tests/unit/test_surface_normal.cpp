@@ -10,7 +10,7 @@
 namespace gewebe::collision {
 namespace {
 
-/// Two faces along an edge from vertex 0 to 1, the second one bent down by `angle`.
+/// Two faces along an edge from vertex 0 to 1, the second one turned down by `angle`.
 CollisionSurface ridge(double angle) {
   CollisionSurface surface;
   surface.rest = {{0, -1, 0}, {0, 1, 0}, {-1, 0, 0}, {std::cos(angle), 0, -std::sin(angle)}};
