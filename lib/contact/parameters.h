@@ -79,7 +79,7 @@ struct Parameters {
   /// Parts of d_hat and of the smallest gap by which free bodies may be moved at the end, so that
   /// their momenta are exact; where the gap is a third of d_hat, forces change by 0.5 %.
   double momentum_room = 1e-3, momentum_gap = 0.1;
-  /// Part of the gap (at most of d_hat) that a step may not use up: it would land deep in the
+  /// Part of the smaller of gap and d_hat that a step may not use up: it would land deep in the
   /// barrier.
   double kept_gap = 0.5;
   /// Compliance that is added to the diagonal where rounding has made W indefinite, over its

@@ -1,7 +1,5 @@
 #include "contact/swept_candidates.h"
 
-#include "collision/ccd.h"
-
 #include <algorithm>
 #include <cstddef>
 
@@ -48,12 +46,18 @@ void SweptCandidates::search(std::span<const Vec3> from, std::span<const Vec3> t
   filter_.reset(candidates_, vertices_, from_);
 }
 
+collision::Separation SweptCandidates::kept_gaps() const {
+  // Surfaces that slide along each other meet new pairs at gaps that are smaller than d_hat: these
+  // may come as near as the others.
+  return {0, parameters_.kept_gap, parameters_.kept_gap * island_.activation_distance,
+          max_advances};
+}
+
 double SweptCandidates::free_part(std::span<const Vec3> from, std::span<const Vec3> to) {
   const double d_hat = island_.activation_distance;
-  const collision::Separation separation{0, parameters_.kept_gap, d_hat, max_advances};
   const auto part_of = [&](double t_max, std::span<const double> steps) {
     return collision::collision_free_step(island_.surface, near(from, d_hat, steps), from, to,
-                                          separation, t_max);
+                                          kept_gaps(), t_max);
   };
   // Pairs in contact limit the way most. Behind them few others remain to be looked at.
   const double most = part_of(1, {});
@@ -64,9 +68,7 @@ double SweptCandidates::free_part(std::span<const Vec3> from, std::span<const Ve
 }
 
 bool SweptCandidates::keep_gaps(std::span<const Vec3> from, std::span<const Vec3> to) const {
-  return collision::collision_free_step(
-             island_.surface, candidates_, from, to,
-             {0, parameters_.kept_gap, island_.activation_distance, max_advances}) >= 1;
+  return collision::collision_free_step(island_.surface, candidates_, from, to, kept_gaps()) >= 1;
 }
 
 bool SweptCandidates::are_free(std::span<const Vec3> from, std::span<const Vec3> to) const {

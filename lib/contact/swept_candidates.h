@@ -3,6 +3,7 @@
 
 #include "collision/candidate_filter.h"
 #include "collision/candidates.h"
+#include "collision/ccd.h"
 #include "contact/step.h"
 #include "geometry/vec3.h"
 
@@ -48,6 +49,7 @@ public:
 
 private:
   bool covers(std::uint32_t vertex, const Vec3& x, double room) const;
+  collision::Separation kept_gaps() const;
 
   const Island& island_;
   collision::BroadPhase& broad_phase_;
