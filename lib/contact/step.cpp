@@ -305,17 +305,19 @@ bool StepSolver::Work::iterate(CondensedSystem& system, int iteration, bool& con
   double contact = renew_gradient();
   CondensedSystem::Residual residual = system.residual(gradient_);
   const double typical = energy_.typical_force();
-  converged = last_step_ <= energy_.step_limit() &&
-              residual.difference <=
-                  p.force_tolerance * std::max(residual.largest, p.small_force * typical);
+  const auto balances_exactly = [&](double tolerance) {
+    return residual.difference <= tolerance * std::max(residual.largest, p.small_force * typical);
+  };
+  converged = last_step_ <= energy_.step_limit() && balances_exactly(p.force_tolerance);
   if (converged)
     return true;
   const auto balances = [&](double tolerance) {
     return residual.difference <= tolerance * std::max(residual.largest, typical);
   };
-  // Normal forces that do not balance are none to hold anything by friction.
+  // Normal forces that do not balance are none to hold anything by friction, and the typical force
+  // of an impact may be much larger than they are.
   const bool lags = energy_.has_friction() && iteration > 0 && way_lags_ < p.max_way_lags &&
-                    balances(p.lag_tolerance);
+                    balances_exactly(p.lag_tolerance);
   const bool stiffer = balances(p.way_tolerance) && energy_.raise_stiffness(residual.largest);
   if (lags)
     energy_.lag(at_, way_lags_++ >= p.whole_lags);
