@@ -205,7 +205,12 @@ std::span<const double> whole_shape(World& w, Object& object) {
       update_stages(w, object, acting_load(shown));
       const std::span<const double> u = static_shape(object);
       require_bounded(object, u);
-      shown.whole.replace().assign(u.begin(), u.end());
+      std::vector<double>& whole = shown.whole.replace();
+      whole.assign(u.begin(), u.end());
+      // Contact has moved the surface by its model of the object, which agrees with `u` up to a
+      // tolerance.
+      if (!shown.rough)
+        std::ranges::copy(*shown.displacement, whole.begin());
     });
   return *shown.whole;
 }

@@ -132,9 +132,11 @@ private:
       }
       for (std::size_t k = 0; k < count && std::getline(lines, row); ++k) {
         const std::vector<double>& all = found->second;
-        if (row != number_text(all[3 * k]) + " " + number_text(all[3 * k + 1]) + " " +
-                       number_text(all[3 * k + 2]))
-          fault = "node " + std::to_string(k) + " of " + name + " is shared elsewhere than " + row;
+        const std::string place = number_text(all[3 * k]) + " " + number_text(all[3 * k + 1]) +
+                                  " " + number_text(all[3 * k + 2]);
+        if (row != place)
+          fault = "node " + std::to_string(k) + " of " + name + " is shared at " + place +
+                  " and answered at " + row;
       }
     }
   }
