@@ -146,6 +146,7 @@ What parse_contact(Words& in) {
   c.object = in.name();
   c.other = in.name();
   SetContact set;
+  set.separate = in.take("separate");
   if (in.take("friction"))
     set.friction = in.number("coefficient");
   if (!(set.friction >= 0))
@@ -420,8 +421,10 @@ const std::array<Verb, 31>& verbs() {
       {"mass", "mass NAME NODES m [each], m 0 or more", true, parse_mass},
       {"displace", "displace NAME NODES dx dy dz [over T]", true, parse_displace},
       {"attach", "attach A NODES B NODES k, k positive", true, parse_attach},
-      {"contact", "contact A B [friction MU] or contact A self [friction MU], MU 0 or more", true,
-       parse_contact},
+      {"contact",
+       "contact A B [separate] [friction MU] or contact A self [separate] [friction MU], MU 0 or "
+       "more",
+       true, parse_contact},
       {"release", "release NAME NODES", true, parse_release},
       {"instrument",
        "instrument NAME sphere R x y z [friction MU], instrument NAME capsule R x y z x y z "

@@ -104,6 +104,7 @@ struct Withdraw {
 struct SetContact {
   std::size_t object = 0, other = 0; ///< equal: self-contact
   double friction = 0;               ///< Coulomb's coefficient, >= 0
+  bool separate = false;             ///< moves surfaces that overlap apart
 };
 struct SetGravity {
   Vec3 gravity;

@@ -489,7 +489,7 @@ void Rule<Restore>::apply(World& w, const Restore& c) {
   move_all(w, c.object, moves, std::move(pieces));
   for (const ContactRule& rule : w.now.contacts) // parts that came off may be where it is whole
     if (rule.object == c.object || rule.other == c.object)
-      require_apart(w, rule, true);
+      require_apart(w, rule);
   let_instruments_enter(w);
 }
 

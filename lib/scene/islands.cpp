@@ -482,8 +482,8 @@ void Rule<SetContact>::check(World& w, const SetContact& c) {
 
 namespace {
 
-/// Separates the walls of cuts that were made before the contact was set.
-void part_walls(World& w, const SetContact& c) {
+/// Separates the walls of cuts that were made before the contact was set, and overlaps.
+void separate(World& w, const SetContact& c) {
   Motions motions;
   for (const std::size_t index : {c.object, c.other})
     if (const auto& body = w.now.objects[index].body)
@@ -494,7 +494,16 @@ void part_walls(World& w, const SetContact& c) {
   require_parted_holds(w, c, motions);
   std::vector<std::size_t> objects{c.object, c.other};
   objects.resize(c.object == c.other ? 1 : 2);
-  const std::vector<std::size_t> moved = separate_walls(w, objects, motions);
+  std::vector<std::size_t> moved = separate_walls(w, objects, motions);
+  if (c.separate) {
+    std::vector<ContactRule> rules{{c.object, c.other, c.friction}};
+    std::ranges::copy_if(w.now.contacts, std::back_inserter(rules), [&](const ContactRule& rule) {
+      return std::ranges::any_of(
+          objects, [&](std::size_t index) { return rule.object == index || rule.other == index; });
+    });
+    const std::vector<std::size_t> more = separate_overlaps(w, rules, objects, true, motions);
+    moved.insert(moved.end(), more.begin(), more.end());
+  }
   if (std::ranges::none_of(
           moved, [&](std::size_t index) { return w.now.objects[index].method == Method::ela; }))
     return;
@@ -510,8 +519,9 @@ void part_walls(World& w, const SetContact& c) {
 } // namespace
 
 void Rule<SetContact>::apply(World& w, const SetContact& c) {
-  require_apart(w, {c.object, c.other, c.friction}, true);
-  part_walls(w, c);
+  if (!c.separate)
+    require_apart(w, {c.object, c.other, c.friction});
+  separate(w, c);
   const auto known = std::ranges::find_if(w.now.contacts, [&](const ContactRule& rule) {
     return std::minmax(rule.object, rule.other) == std::minmax(c.object, c.other);
   });
@@ -534,6 +544,7 @@ void Rule<SetContact>::log(const World& w, const SetContact& c, ChangeRow& row) 
   row.what = "contact";
   row.other = w.now.objects.at(c.other).name();
   row.value = c.friction;
+  row.text = c.separate ? "separate" : "";
 }
 
 } // namespace gewebe::simulation

@@ -490,13 +490,16 @@ void move_all(World& w, std::size_t index, const Moves& moves, std::deque<Object
         return rule.object == index && rule.other == index;
       }))
     separate_walls(w, moves.objects, motions);
-  renew_bodies(w, motions);
   // Walls of wounds in a strained body may pass other surfaces.
-  for (const ContactRule& rule : w.now.contacts)
-    if (std::ranges::any_of(moves.objects, [&](std::size_t object) {
-          return rule.object == object || rule.other == object;
-        }))
-      require_apart(w, rule, false);
+  std::vector<ContactRule> rules;
+  std::ranges::copy_if(w.now.contacts, std::back_inserter(rules), [&](const ContactRule& rule) {
+    return std::ranges::any_of(moves.objects, [&](std::size_t object) {
+      return rule.object == object || rule.other == object;
+    });
+  });
+  if (!rules.empty())
+    separate_overlaps(w, rules, moves.objects, false, motions);
+  renew_bodies(w, motions);
 }
 
 } // namespace gewebe::simulation

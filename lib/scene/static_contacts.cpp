@@ -463,7 +463,7 @@ Pose entry_pose(World& w, const InstrumentShape& shape, const Pose& pose) {
   return start;
 }
 
-void require_apart(World& w, const ContactRule& rule, bool strictly) {
+void require_apart(World& w, const ContactRule& rule) {
   std::vector<std::size_t> objects{rule.object};
   if (rule.other != rule.object)
     objects.push_back(rule.other);
@@ -479,20 +479,18 @@ void require_apart(World& w, const ContactRule& rule, bool strictly) {
   collision::OwnerTable<double> table(objects.size(), -1);
   table.set(0, objects.size() - 1, 0);
   const contact::IslandMotion motion(surfaces, table);
-  std::optional<Vec3> found =
-      motion.find_intersection(x, strictly ? 0 : motion.activation_distance());
-  if (!found && !strictly)
-    found = motion.find_touching(x);
+  const std::optional<Vec3> found = motion.find_intersection(x, 0);
   if (!found)
     return;
   const Vec3& at = *found;
   const std::string& one = w.now.objects[rule.object].name();
-  throw Error((rule.object == rule.other
-                   ? "the surface of object " + one + " passes itself"
-                   : "surfaces of objects " + one + " and " + w.now.objects[rule.other].name() +
-                         " pass each other") +
-              " near " + number_text(at.x) + " " + number_text(at.y) + " " + number_text(at.z) +
-              ", expected surfaces that stand apart for contact");
+  throw Error(
+      (rule.object == rule.other ? "the surface of object " + one + " passes itself"
+                                 : "surfaces of objects " + one + " and " +
+                                       w.now.objects[rule.other].name() + " pass each other") +
+      " near " + number_text(at.x) + " " + number_text(at.y) + " " + number_text(at.z) +
+      ", expected surfaces that stand apart, or contact " + one +
+      (rule.object == rule.other ? " self" : " " + w.now.objects[rule.other].name()) + " separate");
 }
 
 } // namespace gewebe::simulation

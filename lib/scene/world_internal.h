@@ -189,12 +189,8 @@ std::vector<std::size_t> together(const World& w, std::size_t object);
 /// Start pose of an instrument that appears at `pose`: outside of all objects.
 Pose entry_pose(World& w, const InstrumentShape& shape, const Pose& pose);
 /// Requires that surfaces that may touch do not intersect.
-///
-/// \param strictly  false: behind a cut, whose walls have been parted. They may intersect by up to
-/// the activation distance of contact, but not touch
-///
 /// \throw Error naming objects and position
-void require_apart(World& w, const ContactRule& rule, bool strictly);
+void require_apart(World& w, const ContactRule& rule);
 
 // time.cpp: steps through events
 void advance(World& w, double to);
@@ -283,11 +279,25 @@ void sweep_solid(World& w, std::size_t index, std::span<const BladeArea> areas);
 /// \throw Error if surfaces of the contact coincide at nodes that are held. No contact force can
 /// separate them
 void require_parted_holds(const World& w, const SetContact& c, const Motions& motions);
+/// Moves a node but along its fixed axes. \param motions  of bodies' objects; that of an
+/// elastodynamic object is added
+void move_node(World& w, std::size_t object, std::uint32_t node, Vec3 by, Motions& motions);
 /// Separates coincident nodes of these objects' surfaces, so that contact can begin.
 /// \param motions  motions of bodies' objects; those of elastodynamic objects that are moved are
 /// added \return objects that were moved
 std::vector<std::size_t> separate_walls(World& w, std::span<const std::size_t> objects,
                                         Motions& motions);
+
+// separation.cpp: surfaces that overlap
+/// Moves vertices of surfaces that intersect or touch as little as possible, in the mean square, so
+/// that all pairs of the rules stand apart. \param movable  objects whose vertices may move
+/// \param strictly  false: they may intersect by up to the activation distance of contact
+/// \param motions  as of separate_walls(), with those of all bodies of movable objects
+/// \return objects that were moved
+/// \throw Error where they overlap by more than an edge, or held vertices do
+std::vector<std::size_t> separate_overlaps(World& w, std::span<const ContactRule> rules,
+                                           std::span<const std::size_t> movable, bool strictly,
+                                           Motions& motions);
 
 // tears.cpp: tearing of overstrained springs and elements at the end of a step
 void tear(World& w);

@@ -164,11 +164,16 @@ std::vector<Vec3> parting_directions(std::span<const SurfaceNode> group) {
   return directions;
 }
 
-void displace(World& w, std::size_t index, std::uint32_t node, Vec3 by, Motions& motions) {
+} // namespace
+
+void move_node(World& w, std::size_t index, std::uint32_t node, Vec3 by, Motions& motions) {
   Object& object = w.now.objects[index];
   for (int a = 0; a < 3; ++a)
     if (is_fixed(object.model(), node, a))
       by[a] = 0;
+  object.shown.valid = false;
+  object.shown.whole = {};
+  object.shown.box.reset();
   if (object.method == Method::ela) {
     std::vector<NodeMotion>& motion = motions[index];
     motion.resize(object.model().nodes.size());
@@ -179,8 +184,6 @@ void displace(World& w, std::size_t index, std::uint32_t node, Vec3 by, Motions&
   for (int a = 0; a < 3; ++a)
     u[axis_of(node, a)] += by[a];
 }
-
-} // namespace
 
 void require_parted_holds(const World& w, const SetContact& c, const Motions& motions) {
   std::vector<std::size_t> objects{c.object};
@@ -215,15 +218,9 @@ std::vector<std::size_t> separate_walls(World& w, std::span<const std::size_t> o
     for (std::size_t k = 0; k < group.size(); ++k) {
       if (group[k].held)
         continue;
-      displace(w, group[k].object, group[k].node, way * directions[k], motions);
+      move_node(w, group[k].object, group[k].node, way * directions[k], motions);
       moved.insert(group[k].object);
     }
-  }
-  for (const std::size_t index : moved) {
-    Shown& shown = w.now.objects[index].shown;
-    shown.valid = false;
-    shown.whole = {};
-    shown.box.reset();
   }
   return {moved.begin(), moved.end()};
 }

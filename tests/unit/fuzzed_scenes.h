@@ -347,7 +347,7 @@ private:
   std::string contact() {
     const auto name = [&] { return objects_[contacts_() % objects_.size()].name; };
     const std::string one = name(), other = contacts_() % 3 == 0 ? "self" : name();
-    return "contact " + one + " " + other +
+    return "contact " + one + " " + other + (contacts_() % 4 == 0 ? " separate" : "") +
            (contacts_() % 2 == 0
                 ? " friction " + number_text(static_cast<double>(contacts_() % 100) / 50)
                 : "");
