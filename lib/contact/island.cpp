@@ -36,15 +36,13 @@ double median_edge(const collision::CollisionSurface& surface) {
   return *middle;
 }
 
-/// Whether the segment pq passes the inside of a triangle, and both ends are farther than `depth`
-/// from its plane; touching is no passing.
-bool passes(const Vec3& p, const Vec3& q, const Vec3& a, const Vec3& b, const Vec3& c,
-            double depth) {
+/// Whether the segment pq passes the inside of a triangle; touching is no passing.
+bool passes(const Vec3& p, const Vec3& q, const Vec3& a, const Vec3& b, const Vec3& c) {
   const auto volume = [](const Vec3& u, const Vec3& v, const Vec3& s, const Vec3& t) {
     return dot(cross(v - u, s - u), t - u);
   };
   const double up = volume(a, b, c, p), uq = volume(a, b, c, q);
-  if (!(up * uq < 0) || !(std::min(std::abs(up), std::abs(uq)) > depth * norm(cross(b - a, c - a))))
+  if (!(up * uq < 0))
     return false;
   const double ab = volume(p, q, a, b), bc = volume(p, q, b, c), ca = volume(p, q, c, a);
   return (ab > 0 && bc > 0 && ca > 0) || (ab < 0 && bc < 0 && ca < 0);
@@ -219,7 +217,7 @@ void IslandMotion::advance(Members members, double from, double to, const Contex
   advance_parts(members, from, to, max_halvings, context);
 }
 
-std::optional<Vec3> IslandMotion::find_intersection(std::span<const Vec3> x, double depth) const {
+std::optional<Vec3> IslandMotion::find_intersection(std::span<const Vec3> x) const {
   const collision::CollisionSurface& surface = island_->surface;
   std::vector<Box3> boxes;
   for (const auto& t : surface.triangles) {
@@ -238,7 +236,7 @@ std::optional<Vec3> IslandMotion::find_intersection(std::span<const Vec3> x, dou
       if (found || island_->allowed.at(surface.owner[a], surface.owner[t[0]]) == 0 ||
           std::ranges::any_of(t, [&](std::uint32_t v) { return v == a || v == b; }))
         return;
-      found = passes(x[a], x[b], x[t[0]], x[t[1]], x[t[2]], depth);
+      found = passes(x[a], x[b], x[t[0]], x[t[1]], x[t[2]]);
     });
     if (found)
       return (x[a] + x[b]) / 2;

@@ -90,8 +90,7 @@ public:
                const Context& context);
 
   /// Where an edge passes through a triangle. \param x  positions of all vertices
-  /// \param depth  least distance of both ends of the edge from the triangle's plane, mm
-  std::optional<Vec3> find_intersection(std::span<const Vec3> x, double depth) const;
+  std::optional<Vec3> find_intersection(std::span<const Vec3> x) const;
   /// Where surfaces touch, so that no step can begin.
   std::optional<Vec3> find_touching(std::span<const Vec3> x) const;
   const Island& island() const noexcept { return *island_; }

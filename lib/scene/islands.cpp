@@ -501,7 +501,7 @@ void separate(World& w, const SetContact& c) {
       return std::ranges::any_of(
           objects, [&](std::size_t index) { return rule.object == index || rule.other == index; });
     });
-    const std::vector<std::size_t> more = separate_overlaps(w, rules, objects, true, motions);
+    const std::vector<std::size_t> more = separate_overlaps(w, rules, objects, motions);
     moved.insert(moved.end(), more.begin(), more.end());
   }
   if (std::ranges::none_of(

@@ -498,7 +498,7 @@ void move_all(World& w, std::size_t index, const Moves& moves, std::deque<Object
     });
   });
   if (!rules.empty())
-    separate_overlaps(w, rules, moves.objects, false, motions);
+    separate_overlaps(w, rules, moves.objects, motions);
   renew_bodies(w, motions);
 }
 

@@ -136,18 +136,16 @@ std::vector<Vec3> joined(const std::vector<std::vector<Vec3>>& all) {
   return x;
 }
 
-/// Where surfaces intersect by more than `depth`, or touch.
-std::optional<Vec3> meeting(const contact::IslandMotion& motion, std::span<const Vec3> x,
-                            double depth) {
-  const std::optional<Vec3> found = motion.find_intersection(x, depth);
+/// Where surfaces intersect or touch.
+std::optional<Vec3> meeting(const contact::IslandMotion& motion, std::span<const Vec3> x) {
+  const std::optional<Vec3> found = motion.find_intersection(x);
   return found ? found : motion.find_touching(x);
 }
 
 } // namespace
 
 std::vector<std::size_t> separate_overlaps(World& w, std::span<const ContactRule> rules,
-                                           std::span<const std::size_t> movable, bool strictly,
-                                           Motions& motions) {
+                                           std::span<const std::size_t> movable, Motions& motions) {
   std::vector<std::size_t> objects;
   for (const ContactRule& rule : rules)
     for (const std::size_t index : {rule.object, rule.other})
@@ -169,8 +167,7 @@ std::vector<std::size_t> separate_overlaps(World& w, std::span<const ContactRule
   for (const ContactRule& rule : rules)
     friction.set(place(rule.object), place(rule.other), 0);
   contact::IslandMotion motion(surfaces, friction);
-  const double depth = strictly ? 0 : motion.activation_distance();
-  const std::optional<Vec3> where = meeting(motion, joined(target), depth);
+  const std::optional<Vec3> where = meeting(motion, joined(target));
   if (!where)
     return {};
   const auto fail = [&](const std::string& why) {
@@ -190,7 +187,7 @@ std::vector<std::size_t> separate_overlaps(World& w, std::span<const ContactRule
     start.clear();
     for (const StandingSurface& s : all)
       start.push_back(s.drawn_in(drawn));
-    if (!meeting(motion, joined(start), depth))
+    if (!meeting(motion, joined(start)))
       break;
   }
   std::deque<VertexSprings> bodies;

@@ -479,7 +479,7 @@ void require_apart(World& w, const ContactRule& rule) {
   collision::OwnerTable<double> table(objects.size(), -1);
   table.set(0, objects.size() - 1, 0);
   const contact::IslandMotion motion(surfaces, table);
-  const std::optional<Vec3> found = motion.find_intersection(x, 0);
+  const std::optional<Vec3> found = motion.find_intersection(x);
   if (!found)
     return;
   const Vec3& at = *found;

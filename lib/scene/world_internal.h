@@ -291,13 +291,11 @@ std::vector<std::size_t> separate_walls(World& w, std::span<const std::size_t> o
 // separation.cpp: surfaces that overlap
 /// Moves vertices of surfaces that intersect or touch as little as possible, in the mean square, so
 /// that all pairs of the rules stand apart. \param movable  objects whose vertices may move
-/// \param strictly  false: they may intersect by up to the activation distance of contact
 /// \param motions  as of separate_walls(), with those of all bodies of movable objects
 /// \return objects that were moved
 /// \throw Error where they overlap by more than an edge, or held vertices do
 std::vector<std::size_t> separate_overlaps(World& w, std::span<const ContactRule> rules,
-                                           std::span<const std::size_t> movable, bool strictly,
-                                           Motions& motions);
+                                           std::span<const std::size_t> movable, Motions& motions);
 
 // tears.cpp: tearing of overstrained springs and elements at the end of a step
 void tear(World& w);

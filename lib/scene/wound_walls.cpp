@@ -31,7 +31,7 @@ struct SurfaceNode {
   std::size_t object = 0;
   std::uint32_t node = 0;
   Vec3 place;
-  Vec3 normal; ///< unit, outward
+  Vec3 normal; ///< unit, outward: of the walls around, else of all triangles around
   Vec3 inward; ///< at a rim: unit, between the perpendiculars of both of its edges
   bool held = false;
   bool beside_free = false; ///< a triangle around has a node that is not held
@@ -56,7 +56,8 @@ constexpr double same_place = 1e-9;
 /// Unit vector along which nodes are swept: of no mesh's axes, so that few share a coordinate.
 constexpr Vec3 sweep_direction{0.36, 0.48, 0.8};
 
-/// Nodes at one place, and the median edge of all surfaces.
+/// Nodes at one place, and the median edge of all surfaces. Triangles of such nodes alone are
+/// walls; they tell where to part better than those of an outer surface that ends in a sharp rim.
 class SharedPlaces {
 public:
   SharedPlaces(const World& w, std::span<const std::size_t> objects, const Motions& motions) {
@@ -87,6 +88,7 @@ public:
     for (std::vector<SurfaceNode>& group : all)
       std::ranges::sort(group, {},
                         [](const SurfaceNode& node) { return std::pair(node.object, node.node); });
+    use_walls(all);
     return all;
   }
   double median_edge() {
@@ -98,6 +100,29 @@ public:
   }
 
 private:
+  struct Face {
+    std::size_t object = 0;
+    Triangle nodes;
+    Vec3 area;
+  };
+
+  void use_walls(std::vector<std::vector<SurfaceNode>>& groups) const {
+    std::map<std::pair<std::size_t, std::uint32_t>, Vec3> area;
+    for (const std::vector<SurfaceNode>& group : groups)
+      for (const SurfaceNode& node : group)
+        area[{node.object, node.node}] = {};
+    for (const Face& face : faces_)
+      if (std::ranges::all_of(face.nodes, [&](std::uint32_t node) {
+            return area.contains({face.object, node});
+          }))
+        for (const std::uint32_t node : face.nodes)
+          area.at({face.object, node}) += face.area;
+    for (std::vector<SurfaceNode>& group : groups)
+      for (SurfaceNode& node : group)
+        if (const Vec3 wall = unit(area.at({node.object, node.node})); wall != Vec3{})
+          node.normal = wall;
+  }
+
   void add(const Object& object, std::size_t index, const Motions& motions) {
     const Model& model = object.model();
     std::map<std::uint32_t, SurfaceNode> nodes;
@@ -115,6 +140,7 @@ private:
       const bool has_free = !std::ranges::all_of(t, is_held);
       const std::array<Vec3, 3> x{place(t[0]), place(t[1]), place(t[2])};
       const Vec3 area = cross(x[1] - x[0], x[2] - x[0]);
+      faces_.push_back({index, t, area});
       for (std::size_t k = 0; k < 3; ++k) {
         SurfaceNode& node = nodes[t[k]];
         node.normal += area;
@@ -142,6 +168,7 @@ private:
   }
 
   std::vector<SurfaceNode> nodes_;
+  std::vector<Face> faces_;
   std::vector<double> edges_;
 };
 
