@@ -219,29 +219,45 @@ std::vector<std::uint32_t> vertices_of(const Candidates& candidates) {
   return vertices;
 }
 
+template <std::size_t n>
+double collision_free_step(const CollisionSurface& surface,
+                           const std::array<std::uint32_t, n>& vertices, std::size_t first,
+                           std::span<const Vec3> x0, std::span<const Vec3> x1,
+                           const Separation& separation, double t_max) {
+  Separation of_pair = separation;
+  of_pair.d_min += radius_sum(surface, vertices.front(), vertices.back());
+  const auto from = positions(x0, vertices), to = positions(x1, vertices);
+  if constexpr (n == 2)
+    return point_point_step(from, to, of_pair, t_max);
+  else if constexpr (n == 3)
+    return point_edge_step(from, to, of_pair, t_max);
+  else
+    return first == 2 ? edge_edge_step(from, to, of_pair, t_max)
+                      : point_triangle_step(from, to, of_pair, t_max);
+}
+
+template double collision_free_step(const CollisionSurface&, const std::array<std::uint32_t, 2>&,
+                                    std::size_t, std::span<const Vec3>, std::span<const Vec3>,
+                                    const Separation&, double);
+template double collision_free_step(const CollisionSurface&, const std::array<std::uint32_t, 3>&,
+                                    std::size_t, std::span<const Vec3>, std::span<const Vec3>,
+                                    const Separation&, double);
+template double collision_free_step(const CollisionSurface&, const std::array<std::uint32_t, 4>&,
+                                    std::size_t, std::span<const Vec3>, std::span<const Vec3>,
+                                    const Separation&, double);
+
 double collision_free_step(const CollisionSurface& surface, const Candidates& candidates,
                            std::span<const Vec3> x0, std::span<const Vec3> x1,
                            const Separation& separation, double t_max) {
   double step = t_max;
-  const auto shorten = [&](const auto& list, auto&& step_of) {
-    for (const auto& vertices : list) {
-      Separation of_pair = separation;
-      of_pair.d_min += radius_sum(surface, vertices.front(), vertices.back());
-      step = smaller(step, step_of(positions(x0, vertices), positions(x1, vertices), of_pair));
-    }
+  const auto shorten = [&](const auto& list, std::size_t first) {
+    for (const auto& vertices : list)
+      step = collision_free_step(surface, vertices, first, x0, x1, separation, step);
   };
-  shorten(candidates.point_point, [&](const auto& a, const auto& b, const Separation& s) {
-    return point_point_step(a, b, s, step);
-  });
-  shorten(candidates.point_edge, [&](const auto& a, const auto& b, const Separation& s) {
-    return point_edge_step(a, b, s, step);
-  });
-  shorten(candidates.edge_edge, [&](const auto& a, const auto& b, const Separation& s) {
-    return edge_edge_step(a, b, s, step);
-  });
-  shorten(candidates.point_triangle, [&](const auto& a, const auto& b, const Separation& s) {
-    return point_triangle_step(a, b, s, step);
-  });
+  shorten(candidates.point_point, 1);
+  shorten(candidates.point_edge, 1);
+  shorten(candidates.edge_edge, 2);
+  shorten(candidates.point_triangle, 1);
   return step;
 }
 

@@ -91,6 +91,14 @@ private:
 /// Vertices of all candidates, ascending, each once.
 std::vector<std::uint32_t> vertices_of(const Candidates& candidates);
 
+/// Largest step in [0, t_max] along which a pair keeps its separation. \param first  vertices of
+/// its first side \param separation  d_min is added to the sum of the pair's radii
+template <std::size_t n>
+double collision_free_step(const CollisionSurface& surface,
+                           const std::array<std::uint32_t, n>& vertices, std::size_t first,
+                           std::span<const Vec3> x0, std::span<const Vec3> x1,
+                           const Separation& separation, double t_max);
+
 /// Largest step in [0, t_max] along which all candidates keep their separation.
 /// \param separation  d_min is added to the sum of the pair's radii
 double collision_free_step(const CollisionSurface& surface, const Candidates& candidates,

@@ -54,17 +54,7 @@ collision::Separation SweptCandidates::kept_gaps() const {
 }
 
 double SweptCandidates::free_part(std::span<const Vec3> from, std::span<const Vec3> to) {
-  const double d_hat = island_.activation_distance;
-  const auto part_of = [&](double t_max, std::span<const double> steps) {
-    return collision::collision_free_step(island_.surface, near(from, d_hat, steps), from, to,
-                                          kept_gaps(), t_max);
-  };
-  // Pairs in contact limit the way most. Behind them few others remain to be looked at.
-  const double most = part_of(1, {});
-  steps_.assign(from.size(), 0);
-  for (const std::uint32_t v : vertices_)
-    steps_[v] = most * norm(to[v] - from[v]);
-  return part_of(most, steps_);
+  return filter_.free_step(island_.surface, from, to, kept_gaps());
 }
 
 bool SweptCandidates::keep_gaps(std::span<const Vec3> from, std::span<const Vec3> to) const {

@@ -31,9 +31,8 @@ public:
   std::uint64_t searches() const { return searches_; }
 
   /// Candidates whose gap at x may be `range` or less. \return valid until the next call
-  const collision::Candidates& near(std::span<const Vec3> x, double range,
-                                    std::span<const double> steps = {}) {
-    return filter_.select(island_.surface, x, range, steps);
+  const collision::Candidates& near(std::span<const Vec3> x, double range) {
+    return filter_.select(island_.surface, x, range);
   }
   /// Largest part of the ways along which no surfaces use up more than a part of their gap.
   /// \pre only vertices() have ways
@@ -58,7 +57,6 @@ private:
   collision::CandidateFilter filter_;
   std::vector<std::uint32_t> vertices_;
   std::vector<Vec3> from_, way_;
-  std::vector<double> steps_; ///< by vertex of the island, of the last ways
   std::uint64_t searches_ = 0;
 };
 

@@ -422,26 +422,17 @@ TEST(CandidateFilter, SelectsWhatMeasuringAllSelects) {
     for (Vec3& p : x)
       p += size * random_point(random, 1);
     const double range = step % 3 == 0 ? 0.5 : 0.05;
-    std::vector<double> steps; // of some calls
-    for (std::size_t v = 0; step % 2 == 1 && v < x.size(); ++v)
-      steps.push_back(0.1 * std::abs(random_point(random, 1).x));
     Candidates expected;
     const auto look = [&](const auto& list, bool edges, auto& to) {
-      for (const auto& pair : list) {
-        double sides[2] = {0, 0};
-        for (std::size_t k = 0; k < pair.size() && !steps.empty(); ++k) {
-          double& side = sides[k < (edges ? 2U : 1U) ? 0 : 1];
-          side = larger(side, steps[pair[k]]);
-        }
-        if (gap_at(surface, x, pair, edges) <= range + sides[0] + sides[1])
+      for (const auto& pair : list)
+        if (gap_at(surface, x, pair, edges) <= range)
           to.push_back(pair);
-      }
     };
     look(all.point_point, false, expected.point_point);
     look(all.point_edge, false, expected.point_edge);
     look(all.edge_edge, true, expected.edge_edge);
     look(all.point_triangle, false, expected.point_triangle);
-    const Candidates& near = filter.select(surface, x, range, steps);
+    const Candidates& near = filter.select(surface, x, range);
     EXPECT_EQ(near.point_point, expected.point_point) << step;
     EXPECT_EQ(near.point_edge, expected.point_edge) << step;
     EXPECT_EQ(near.edge_edge, expected.edge_edge) << step;
@@ -451,6 +442,37 @@ TEST(CandidateFilter, SelectsWhatMeasuringAllSelects) {
   }
   EXPECT_GT(selected, 10 * calls);
   EXPECT_LT(selected, calls * all.size() / 2);
+}
+
+TEST(CandidateFilter, GoesAsFarAsAllCandidatesAllow) {
+  const CollisionSurface surface = test::two_sheets(9, 0.3, 0.1, 0.4, 5);
+  AllowedPairs allowed(4, 1);
+  std::vector<Vec3> x = surface.rest;
+  Candidates all;
+  BroadPhase(surface).find(surface, x, x, 2, allowed, all);
+  const std::vector<std::uint32_t> vertices = vertices_of(all);
+  CandidateFilter filter;
+  filter.reset(all, vertices, x);
+  std::mt19937 random(4);
+  const Separation separation{0, 0.5, 0.02, 1000};
+  std::size_t stopped = 0, passed = 0;
+  for (int step = 0; step < 200; ++step) {
+    const double size = step % 17 == 0 ? 1 : 0.03;
+    const Vec3 together = random_point(random, 1);
+    std::vector<Vec3> to = x;
+    for (const std::uint32_t v : vertices)
+      to[v] += together + size * random_point(random, 1);
+    const double expected = collision_free_step(surface, all, x, to, separation);
+    const double found = filter.free_step(surface, x, to, separation);
+    EXPECT_EQ(found, expected) << step;
+    (found < 1 ? stopped : passed) += 1;
+    for (const std::uint32_t v : vertices)
+      x[v] += 0.5 * found * (to[v] - x[v]);
+    if (step % 3 == 0)
+      (void)filter.select(surface, x, 0.05);
+  }
+  EXPECT_GT(stopped, 20U);
+  EXPECT_GT(passed, 20U);
 }
 
 } // namespace
