@@ -180,15 +180,17 @@ std::vector<std::size_t> separate_overlaps(World& w, std::span<const ContactRule
   const double most = farthest * motion.island().edge;
   std::vector<std::vector<Vec3>> start;
   double drawn = motion.activation_distance();
-  for (;; drawn *= 2) {
-    if (drawn > most)
-      throw fail("stand in each other by more than " + number_text(2 * most) +
-                 " mm, or where they are held, expected surfaces that can be moved apart");
+  const auto draw_in = [&] {
     start.clear();
     for (const StandingSurface& s : all)
       start.push_back(s.drawn_in(drawn));
-    if (!meeting(motion, joined(start)))
-      break;
+    return !meeting(motion, joined(start));
+  };
+  while (!draw_in()) {
+    drawn *= 2;
+    if (drawn > most)
+      throw fail("stand in each other by more than " + number_text(2 * most) +
+                 " mm, or where they are held, expected surfaces that can be moved apart");
   }
   std::deque<VertexSprings> bodies;
   std::vector<contact::IslandMember*> members;

@@ -281,7 +281,7 @@ void sweep_solid(World& w, std::size_t index, std::span<const BladeArea> areas);
 void require_parted_holds(const World& w, const SetContact& c, const Motions& motions);
 /// Moves a node but along its fixed axes. \param motions  of bodies' objects; that of an
 /// elastodynamic object is added
-void move_node(World& w, std::size_t object, std::uint32_t node, Vec3 by, Motions& motions);
+void move_node(World& w, std::size_t index, std::uint32_t node, Vec3 by, Motions& motions);
 /// Separates coincident nodes of these objects' surfaces, so that contact can begin.
 /// \param motions  motions of bodies' objects; those of elastodynamic objects that are moved are
 /// added \return objects that were moved

@@ -125,7 +125,7 @@ TEST_P(Separation, SurfacesThatStandApartAreLeftAlone) {
   const auto s_made = two_blocks(GetParam(), -0.5);
   Simulation& s = *s_made;
   s.apply(SetContact{0, 1, 0, true});
-  for (const std::size_t object : {0, 1})
+  for (const std::size_t object : {std::size_t{0}, std::size_t{1}})
     for (const double u : shape(s, object))
       EXPECT_EQ(u, 0);
 }
