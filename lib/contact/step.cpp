@@ -74,7 +74,6 @@ public:
       : island_(island), inverses_(inverses), options_(options), context_(context),
         count_(island.table.vertex_count()), begin_(read_positions(island.table)), at_(begin_),
         way_(count_), trial_(count_), gradient_(count_), d_hat_(island.activation_distance),
-        round_limit_(options.parameters.round_tolerance * island.edge),
         candidates_(island, broad_phase, options.parameters), energy_(island, options, begin_) {}
 
   StepReport run();
@@ -132,7 +131,6 @@ private:
   std::vector<Vec3> way_;   ///< x_free - x of the round
   std::vector<Vec3> trial_, gradient_;
   double d_hat_;
-  double round_limit_;   ///< of the last change by a round
   double last_step_ = 0; ///< length of the last full step of Newton's method; else infinite
   int way_lags_ = 0, round_lags_ = 0; ///< renewals of friction on the way, and behind solutions
   bool led_ = false;                  ///< some vertices go ways that nothing stops
@@ -490,7 +488,7 @@ void StepSolver::Work::sharpen(double change) {
     return;
   // Rounds may alternate.
   const double rate = std::sqrt(change / changes_[changes_.size() - 3]);
-  const double rounds = std::log(round_limit_ / change) / std::log(rate);
+  const double rounds = std::log(p.round_tolerance * d_hat_ / change) / std::log(rate);
   if (rate < 1 && rounds <= p.slow_rounds)
     return;
   for (ContactBody* const body : island_.table.bodies)
@@ -586,7 +584,7 @@ StepReport StepSolver::Work::run() {
       find_pairs(at_);
       pair_forces_ = energy_.forces(at_);
       at_.swap(trial_);
-      if (settled_ && (linear || (number > 0 && exact && change <= round_limit_)))
+      if (settled_ && (linear || (number > 0 && exact && change <= p.round_tolerance * d_hat_)))
         break;
       sharpen(change);
     } else {
