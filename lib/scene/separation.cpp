@@ -137,7 +137,7 @@ std::vector<Vec3> joined(const std::vector<std::vector<Vec3>>& all) {
 }
 
 /// Where surfaces intersect or touch.
-std::optional<Vec3> meeting(const contact::IslandMotion& motion, std::span<const Vec3> x) {
+std::optional<Vec3> find_overlap(const contact::IslandMotion& motion, std::span<const Vec3> x) {
   const std::optional<Vec3> found = motion.find_intersection(x);
   return found ? found : motion.find_touching(x);
 }
@@ -167,7 +167,7 @@ std::vector<std::size_t> separate_overlaps(World& w, std::span<const ContactRule
   for (const ContactRule& rule : rules)
     friction.set(place(rule.object), place(rule.other), 0);
   contact::IslandMotion motion(surfaces, friction);
-  const std::optional<Vec3> where = meeting(motion, joined(target));
+  const std::optional<Vec3> where = find_overlap(motion, joined(target));
   if (!where)
     return {};
   const auto fail = [&](const std::string& why) {
@@ -184,7 +184,7 @@ std::vector<std::size_t> separate_overlaps(World& w, std::span<const ContactRule
     start.clear();
     for (const StandingSurface& s : all)
       start.push_back(s.drawn_in(drawn));
-    return !meeting(motion, joined(start));
+    return !find_overlap(motion, joined(start));
   };
   while (!draw_in()) {
     drawn *= 2;
