@@ -519,16 +519,21 @@ void separate(World& w, const SetContact& c) {
 } // namespace
 
 void Rule<SetContact>::apply(World& w, const SetContact& c) {
+  const ContactRule rule{c.object, c.other, c.friction};
   if (!c.separate)
-    require_apart(w, {c.object, c.other, c.friction});
+    require_apart(w, rule);
   separate(w, c);
-  const auto known = std::ranges::find_if(w.now.contacts, [&](const ContactRule& rule) {
-    return std::minmax(rule.object, rule.other) == std::minmax(c.object, c.other);
+  if (c.separate) {
+    require_outside(w, rule);
+    let_instruments_enter(w);
+  }
+  const auto known = std::ranges::find_if(w.now.contacts, [&](const ContactRule& other) {
+    return std::minmax(other.object, other.other) == std::minmax(c.object, c.other);
   });
   if (known != w.now.contacts.end())
     known->friction = c.friction;
   else
-    w.now.contacts.push_back({c.object, c.other, c.friction});
+    w.now.contacts.push_back(rule);
   for (const std::size_t index : {c.object, c.other}) {
     Object& object = w.now.objects[index];
     object.meets = true;

@@ -493,4 +493,50 @@ void require_apart(World& w, const ContactRule& rule) {
       (rule.object == rule.other ? " self" : " " + w.now.objects[rule.other].name()) + " separate");
 }
 
+namespace {
+
+bool is_closed(const contact::BodySurface& surface) {
+  std::map<std::pair<std::uint32_t, std::uint32_t>, int> triangles_of_edge;
+  for (const auto& t : surface.triangles)
+    for (std::size_t k = 0; k < 3; ++k)
+      ++triangles_of_edge[std::minmax(t[k], t[(k + 1) % 3])];
+  return std::ranges::all_of(triangles_of_edge, [](const auto& edge) { return edge.second == 2; });
+}
+
+/// A vertex of each connected component.
+std::vector<std::uint32_t> vertices_of_components(const contact::BodySurface& surface) {
+  DisjointSets sets(surface.rest.size());
+  for (const auto& t : surface.triangles) {
+    sets.join(t[0], t[1]);
+    sets.join(t[0], t[2]);
+  }
+  std::vector<std::uint32_t> all;
+  for (std::uint32_t v = 0; v < surface.rest.size(); ++v)
+    if (sets.find(v) == v)
+      all.push_back(v);
+  return all;
+}
+
+} // namespace
+
+void require_outside(World& w, const ContactRule& rule) {
+  if (rule.object == rule.other)
+    return;
+  for (const auto& [inner, outer] :
+       {std::pair(rule.object, rule.other), std::pair(rule.other, rule.object)}) {
+    const contact::ModelSurface of_inner = contact::model_surface(w.now.objects[inner].model());
+    const contact::ModelSurface of_outer = contact::model_surface(w.now.objects[outer].model());
+    if (!is_closed(of_outer.surface))
+      continue;
+    const std::vector<Vec3> x = shown_positions(w, inner, of_inner);
+    const std::vector<Vec3> y = shown_positions(w, outer, of_outer);
+    for (const std::uint32_t v : vertices_of_components(of_inner.surface))
+      if (winding(of_outer, y, x[v]) > 0.5)
+        throw Error("the surface of object " + w.now.objects[inner].name() + " is inside object " +
+                    w.now.objects[outer].name() + " near " + number_text(x[v].x) + " " +
+                    number_text(x[v].y) + " " + number_text(x[v].z) +
+                    ", expected surfaces that can be moved apart");
+  }
+}
+
 } // namespace gewebe::simulation

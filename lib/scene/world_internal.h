@@ -191,6 +191,9 @@ Pose entry_pose(World& w, const InstrumentShape& shape, const Pose& pose);
 /// Requires that surfaces that may touch do not intersect.
 /// \throw Error naming objects and position
 void require_apart(World& w, const ContactRule& rule);
+/// Requires that no connected part of either surface is inside the other one, where that is closed.
+/// \pre they do not intersect \throw Error naming objects and position
+void require_outside(World& w, const ContactRule& rule);
 
 // time.cpp: steps through events
 void advance(World& w, double to);

@@ -406,15 +406,24 @@ double gap_at(const CollisionSurface& surface, std::span<const Vec3> x,
   return std::sqrt(square) - radius_sum(surface, vertices.front(), vertices.back());
 }
 
-TEST(CandidateFilter, SelectsWhatMeasuringAllSelects) {
-  const CollisionSurface surface = test::two_sheets(9, 0.3, 0.1, 0.4, 5);
-  AllowedPairs allowed(4, 1);
+/// Two sheets, all that may meet on them, and a filter of that.
+struct FilteredSheets {
+  CollisionSurface surface = test::two_sheets(9, 0.3, 0.1, 0.4, 5);
   std::vector<Vec3> x = surface.rest;
   Candidates all;
-  BroadPhase(surface).find(surface, x, x, 2, allowed, all);
-  const std::vector<std::uint32_t> vertices = vertices_of(all);
+  std::vector<std::uint32_t> vertices;
   CandidateFilter filter;
-  filter.reset(all, vertices, x);
+
+  FilteredSheets() {
+    BroadPhase(surface).find(surface, x, x, 2, AllowedPairs(4, 1), all);
+    vertices = vertices_of(all);
+    filter.reset(all, vertices, x);
+  }
+};
+
+TEST(CandidateFilter, SelectsWhatMeasuringAllSelects) {
+  FilteredSheets sheets;
+  auto& [surface, x, all, vertices, filter] = sheets;
   std::mt19937 random(3);
   std::size_t selected = 0, calls = 0;
   for (int step = 0; step < 200; ++step) {
@@ -445,14 +454,8 @@ TEST(CandidateFilter, SelectsWhatMeasuringAllSelects) {
 }
 
 TEST(CandidateFilter, GoesAsFarAsAllCandidatesAllow) {
-  const CollisionSurface surface = test::two_sheets(9, 0.3, 0.1, 0.4, 5);
-  AllowedPairs allowed(4, 1);
-  std::vector<Vec3> x = surface.rest;
-  Candidates all;
-  BroadPhase(surface).find(surface, x, x, 2, allowed, all);
-  const std::vector<std::uint32_t> vertices = vertices_of(all);
-  CandidateFilter filter;
-  filter.reset(all, vertices, x);
+  FilteredSheets sheets;
+  auto& [surface, x, all, vertices, filter] = sheets;
   std::mt19937 random(4);
   const Separation separation{0, 0.5, 0.02, 1000};
   std::size_t stopped = 0, passed = 0;

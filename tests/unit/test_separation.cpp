@@ -121,6 +121,18 @@ TEST_P(Separation, TooDeepOrHeldIsRefusedByName) {
   EXPECT_NE(other.find("or where they are held"), std::string::npos) << other;
 }
 
+TEST_P(Separation, ABodyInsideAnotherIsRefused) {
+  Simulation s(one_thread(), {});
+  s.add_object("outer", block(4, 4, 4, {}), GetParam(), {},
+               GetParam() == Method::ela ? Integration::implicit : Integration::automatic);
+  s.add_object("inner", block(1, 1, 1, {5.3, 6.1, 7.2}), GetParam(), {},
+               GetParam() == Method::ela ? Integration::implicit : Integration::automatic);
+  const std::string said = refusal(s, {0, 1, 0, true});
+  EXPECT_NE(said.find("the surface of object inner is inside object outer near "),
+            std::string::npos)
+      << said;
+}
+
 TEST_P(Separation, SurfacesThatStandApartAreLeftAlone) {
   const auto s_made = two_blocks(GetParam(), -0.5);
   Simulation& s = *s_made;
