@@ -5,9 +5,10 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <cmath>
 #include <limits>
-#include <tuple>
+#include <numeric>
 #include <type_traits>
 
 namespace gewebe::collision {
@@ -21,6 +22,8 @@ constexpr double many_measured = 0.05;
 constexpr double many_seen = 1;
 /// Candidates of a block.
 constexpr std::size_t block_size = 64;
+/// What bounds of sums are multiplied by, so that rounding does not make them too small.
+constexpr double with_rounding = 1 + 1e-12;
 
 template <std::size_t n>
 double gap_of(const CollisionSurface& surface, std::span<const Vec3> x,
@@ -30,18 +33,6 @@ double gap_of(const CollisionSurface& surface, std::span<const Vec3> x,
     y[k] = x[vertices[k]];
   return std::sqrt(squared_distance(closest_feature(y, first), y)) -
          radius_sum(surface, vertices.front(), vertices.back());
-}
-
-/// Sum of the largest values of both sides of a pair. \param first  vertices of its first side
-template <std::size_t n>
-double both_sides(const std::array<std::uint32_t, n>& vertices, std::size_t first,
-                  std::span<const double> values) {
-  std::array<double, 2> most{0, 0};
-  for (std::size_t k = 0; k < n; ++k) {
-    double& side = most[k < first ? 0 : 1];
-    side = values[vertices[k]] <= side ? side : values[vertices[k]]; // NaN stays
-  }
-  return most[0] + most[1];
 }
 
 /// Largest difference of the vectors of both sides of a pair: their distance changes by no more
@@ -59,151 +50,246 @@ double between_sides(const std::array<std::uint32_t, n>& vertices, std::size_t f
   return std::sqrt(most);
 }
 
+/// Calls act(number of vertices as a constant, vertices of the first side) for a list of
+/// Candidates.
+template <class Act>
+void with_list(std::size_t list, const Act& act) {
+  if (list == 0)
+    act(std::integral_constant<std::size_t, 2>(), std::size_t{1});
+  else if (list == 1)
+    act(std::integral_constant<std::size_t, 3>(), std::size_t{1});
+  else
+    act(std::integral_constant<std::size_t, 4>(), list == 2 ? std::size_t{2} : std::size_t{1});
+}
+
+template <std::size_t n>
+std::array<std::uint32_t, n> first_of(const std::array<std::uint32_t, 4>& vertices) {
+  std::array<std::uint32_t, n> first;
+  std::copy_n(vertices.begin(), n, first.begin());
+  return first;
+}
+
+/// Buckets of gaps, two for each power of two: the order of magnitude, by the bits of the number.
+constexpr std::size_t buckets = 128;
+std::size_t bucket_of(double gap) {
+  constexpr std::uint64_t smallest = std::bit_cast<std::uint64_t>(0x1p-32) >> 51;
+  if (!(gap > 0x1p-32))
+    return 0;
+  return std::min<std::uint64_t>((std::bit_cast<std::uint64_t>(gap) >> 51) - smallest, buckets - 1);
+}
+
 } // namespace
 
-void CandidateFilter::reset(const Candidates& candidates, std::span<const std::uint32_t> vertices,
+void CandidateFilter::reset(const CollisionSurface& surface, const Candidates& candidates,
+                            std::span<const double> gaps, std::span<const std::uint32_t> vertices,
                             std::span<const Vec3> x) {
+  surface_ = &surface;
   candidates_ = &candidates;
   vertices_ = vertices;
-  constexpr double unknown = -std::numeric_limits<double>::infinity();
-  gap_.assign(candidates.size(), unknown);
+  groups_.clear();
+  blocks_.clear();
+  pairs_.clear();
+  pairs_.reserve(candidates.size());
   seen_ = 0;
-  least_.assign((gap_.size() + block_size - 1) / block_size, unknown);
   reference_.clear();
   for (const std::uint32_t v : vertices)
     reference_.push_back(x[v]);
-}
-
-double CandidateFilter::move_to(std::span<const Vec3> x) {
-  moved_.resize(x.size());
-  length_.resize(x.size());
-  double most = 0;
-  for (std::size_t k = 0; k < vertices_.size(); ++k) {
-    const std::uint32_t v = vertices_[k];
-    moved_[v] = x[v] - reference_[k];
-    length_[v] = norm(moved_[v]);
-    most = length_[v] <= most ? most : length_[v]; // NaN stays
-  }
-  measured_.clear();
-  return most;
-}
-
-template <class Act>
-void CandidateFilter::for_lists(const Act& act) {
-  std::size_t begin = 0;
-  const auto next = [&](const auto& list, std::size_t first, auto& to) {
-    act(list, first, to, begin);
-    begin += list.size();
+  std::uint32_t number = 0;
+  std::vector<std::uint32_t> sorted;
+  const auto add = [&](const auto& list, std::size_t which) {
+    for (std::size_t k = 0; k < list.size();) {
+      const Group group{which, surface.owner[list[k].front()], surface.owner[list[k].back()], 0, 0};
+      std::size_t end = k;
+      std::array<std::size_t, buckets + 1> begin{};
+      for (; end < list.size() && surface.owner[list[end].front()] == group.a &&
+             surface.owner[list[end].back()] == group.b;
+           ++end)
+        ++begin[bucket_of(gaps[number + end]) + 1];
+      std::partial_sum(begin.begin(), begin.end(), begin.begin());
+      const std::size_t before = pairs_.size();
+      pairs_.resize(before + end - k);
+      for (; k < end; ++k) {
+        const double gap = gaps[number + k];
+        Pair& pair = pairs_[before + begin[bucket_of(gap)]++];
+        std::ranges::copy(list[k], pair.vertices.begin());
+        pair.number = number + static_cast<std::uint32_t>(k);
+        pair.bound = gap;
+      }
+      groups_.push_back(group);
+      for (std::size_t p = before; p < pairs_.size(); p += block_size) {
+        Block& block = blocks_.emplace_back();
+        block.begin = p;
+        block.end = std::min(p + block_size, pairs_.size());
+        block.group = groups_.size() - 1;
+        set_least(block);
+      }
+    }
+    number += static_cast<std::uint32_t>(list.size());
   };
-  next(candidates_->point_point, 1, near_.point_point);
-  next(candidates_->point_edge, 1, near_.point_edge);
-  next(candidates_->edge_edge, 2, near_.edge_edge);
-  next(candidates_->point_triangle, 1, near_.point_triangle);
+  add(candidates.point_point, 0);
+  add(candidates.point_edge, 1);
+  add(candidates.edge_edge, 2);
+  add(candidates.point_triangle, 3);
+}
+
+void CandidateFilter::set_least(Block& block) const {
+  double least = std::numeric_limits<double>::infinity();
+  for (std::size_t p = block.begin; p < block.end; ++p)
+    least = pairs_[p].bound >= least ? least : pairs_[p].bound; // NaN stays
+  block.least = least - block.less;
+}
+
+void CandidateFilter::set_motion(std::span<const Vec3> vectors, double Group::*bound) {
+  struct Motion {
+    Vec3 mean;
+    double count = 0, deviation = 0;
+  };
+  std::vector<Motion> motions;
+  for (const std::uint32_t v : vertices_) {
+    const std::uint32_t owner = surface_->owner[v];
+    if (owner >= motions.size())
+      motions.resize(owner + std::size_t{1});
+    motions[owner].mean += vectors[v];
+    ++motions[owner].count;
+  }
+  for (Motion& motion : motions)
+    if (motion.count > 0)
+      motion.mean = motion.mean / motion.count;
+  for (const std::uint32_t v : vertices_) {
+    Motion& motion = motions[surface_->owner[v]];
+    const double deviation = norm(vectors[v] - motion.mean);
+    motion.deviation = deviation <= motion.deviation ? motion.deviation : deviation; // NaN stays
+  }
+  for (Group& group : groups_) {
+    const Motion &a = motions[group.a], &b = motions[group.b];
+    group.*bound = with_rounding * (norm(a.mean - b.mean) + a.deviation + b.deviation);
+  }
+}
+
+void CandidateFilter::move_to(std::span<const Vec3> x) {
+  moved_.resize(x.size());
+  for (std::size_t k = 0; k < vertices_.size(); ++k)
+    moved_[vertices_[k]] = x[vertices_[k]] - reference_[k];
+  set_motion(moved_, &Group::moved);
+  measured_.clear();
+  for (Block& block : blocks_)
+    block.seen = false;
 }
 
 void CandidateFilter::keep_measured() {
-  const auto all = static_cast<double>(gap_.size());
+  const auto all = static_cast<double>(pairs_.size());
   const bool follows = static_cast<double>(measured_.size()) > many_measured * all ||
                        static_cast<double>(seen_) > many_seen * all;
   if (follows) {
     seen_ = 0;
-    for_lists([&](const auto& list, std::size_t first, auto& /*to*/, std::size_t number) {
-      for (const auto& vertices : list)
-        gap_[number++] -= between_sides(vertices, first, moved_);
-    });
+    for (Block& block : blocks_) {
+      const Group& group = groups_[block.group];
+      if (!block.seen) {
+        block.less += group.moved;
+        block.least -= group.moved;
+        continue;
+      }
+      with_list(group.list, [&](auto n, std::size_t first) {
+        for (std::size_t p = block.begin; p < block.end; ++p)
+          pairs_[p].bound -= between_sides(first_of<n()>(pairs_[p].vertices), first, moved_);
+      });
+    }
     for (std::size_t k = 0; k < vertices_.size(); ++k)
       reference_[k] += moved_[vertices_[k]];
   }
-  for (const auto& [number, gap, moved] : measured_) {
-    const double bound = follows ? gap : gap - moved;
-    gap_[number] = bound > gap_[number] ? bound : gap_[number];
+  for (const Measured& m : measured_) {
+    const double bound = (follows ? m.gap : m.gap - m.moved) + blocks_[m.block].less;
+    pairs_[m.pair].bound = bound > pairs_[m.pair].bound ? bound : pairs_[m.pair].bound;
   }
-  const auto renew = [&](std::size_t block) {
-    const auto begin = gap_.begin() + static_cast<std::ptrdiff_t>(block * block_size);
-    least_[block] =
-        *std::min_element(begin, begin + std::min<std::ptrdiff_t>(block_size, gap_.end() - begin));
-  };
-  if (follows)
-    for (std::size_t block = 0; block < least_.size(); ++block)
-      renew(block);
-  else
-    for (std::size_t k = 0; k < measured_.size(); ++k)
-      if (const std::size_t block = measured_[k].candidate / block_size;
-          k + 1 == measured_.size() || measured_[k + 1].candidate / block_size != block)
-        renew(block);
+  for (Block& block : blocks_)
+    if (block.seen)
+      set_least(block);
 }
 
-const Candidates& CandidateFilter::select(const CollisionSurface& surface, std::span<const Vec3> x,
-                                          double range) {
-  const double any = range + 2 * move_to(x);
-  near_.clear();
-  for_lists([&](const auto& list, std::size_t first, auto& to, std::size_t begin) {
-    for (std::size_t k = 0; k < list.size();) {
-      const std::size_t number = begin + k;
-      if (least_[number / block_size] > any) {
-        k += block_size - number % block_size;
-        continue;
+const Candidates& CandidateFilter::select(std::span<const Vec3> x, double range) {
+  move_to(x);
+  numbers_.clear();
+  for (std::size_t number = 0; number < blocks_.size(); ++number) {
+    Block& block = blocks_[number];
+    const Group& group = groups_[block.group];
+    if (block.least > range + group.moved)
+      continue;
+    block.seen = true;
+    with_list(group.list, [&](auto n, std::size_t first) {
+      for (std::size_t p = block.begin; p < block.end; ++p) {
+        const double bound = pairs_[p].bound - block.less;
+        seen_ += bound > range ? 1 : 0;
+        if (bound > range + group.moved)
+          continue;
+        const auto vertices = first_of<n()>(pairs_[p].vertices);
+        const double moved = between_sides(vertices, first, moved_);
+        if (bound - moved > range)
+          continue;
+        const double gap = gap_of(*surface_, x, vertices, first);
+        measured_.push_back({number, p, gap, moved});
+        if (!(gap > range))
+          numbers_.push_back(pairs_[p].number);
       }
-      const auto& vertices = list[k++];
-      seen_ += gap_[number] > range ? 1 : 0;
-      // Cheap bounds first.
-      if (gap_[number] > any || gap_[number] > range + both_sides(vertices, first, length_))
-        continue;
-      const double moved = between_sides(vertices, first, moved_);
-      if (gap_[number] - moved > range)
-        continue;
-      const double gap = gap_of(surface, x, vertices, first);
-      measured_.push_back({number, gap, moved});
-      if (!(gap > range))
-        to.push_back(vertices);
-    }
-  });
+    });
+  }
   keep_measured();
+  std::ranges::sort(numbers_);
+  near_.clear();
+  std::size_t k = 0, begin = 0;
+  const auto take = [&](const auto& list, auto& to) {
+    for (; k < numbers_.size() && numbers_[k] < begin + list.size(); ++k)
+      to.push_back(list[numbers_[k] - begin]);
+    begin += list.size();
+  };
+  take(candidates_->point_point, near_.point_point);
+  take(candidates_->point_edge, near_.point_edge);
+  take(candidates_->edge_edge, near_.edge_edge);
+  take(candidates_->point_triangle, near_.point_triangle);
   return near_;
 }
 
-double CandidateFilter::free_step(const CollisionSurface& surface, std::span<const Vec3> x0,
-                                  std::span<const Vec3> x1, const Separation& separation) {
-  const double moved_most = move_to(x0), range = separation.most;
+double CandidateFilter::free_step(std::span<const Vec3> x0, std::span<const Vec3> x1,
+                                  const Separation& separation) {
+  const double range = separation.most;
+  move_to(x0);
   way_.resize(x0.size());
-  way_length_.resize(x0.size());
-  double way_most = 0;
-  for (const std::uint32_t v : vertices_) {
+  for (const std::uint32_t v : vertices_)
     way_[v] = x1[v] - x0[v];
-    way_length_[v] = norm(way_[v]);
-    way_most = way_length_[v] <= way_most ? way_most : way_length_[v]; // NaN stays
-  }
-  struct Block {
-    double least = 0;
-    std::size_t number = 0;
+  set_motion(way_, &Group::way);
+  struct Ahead {
+    double least = 0; ///< gap
+    std::size_t block = 0;
   };
-  std::vector<Block> blocks;
-  for (std::size_t block = 0; block < least_.size(); ++block)
-    if (!(least_[block] > range + 2 * (moved_most + way_most)))
-      blocks.push_back({least_[block], block});
-  std::ranges::stable_sort(blocks, {}, &Block::least);
+  std::vector<Ahead> ahead;
+  for (std::size_t number = 0; number < blocks_.size(); ++number) {
+    const Group& group = groups_[blocks_[number].group];
+    const double least = blocks_[number].least - group.moved;
+    if (!(least > range + group.way))
+      ahead.push_back({least, number});
+  }
+  std::ranges::stable_sort(ahead, {}, &Ahead::least);
   double step = 1;
-  for (const Block& block : blocks) {
-    if (block.least > range + 2 * (moved_most + step * way_most))
-      break;
-    const std::size_t from = block.number * block_size;
-    const std::size_t to = std::min(from + block_size, gap_.size());
-    for_lists([&](const auto& list, std::size_t first, auto& /*near*/, std::size_t begin) {
-      const std::size_t end = std::min(to, begin + list.size());
-      for (std::size_t number = std::max(from, begin); number < end; ++number) {
-        const auto& vertices = list[number - begin];
-        const double along = range + step * both_sides(vertices, first, way_length_);
-        seen_ += gap_[number] > along ? 1 : 0;
-        if (gap_[number] > along + both_sides(vertices, first, length_))
+  for (const auto& [least, number] : ahead) {
+    Block& block = blocks_[number];
+    const Group& group = groups_[block.group];
+    if (least > range + step * group.way)
+      continue;
+    block.seen = true;
+    with_list(group.list, [&](auto n, std::size_t first) {
+      for (std::size_t p = block.begin; p < block.end; ++p) {
+        const double bound = pairs_[p].bound - block.less;
+        seen_ += bound > range + step * group.way ? 1 : 0;
+        if (bound - group.moved > range + step * group.way)
           continue;
+        const auto vertices = first_of<n()>(pairs_[p].vertices);
         const double moved = between_sides(vertices, first, moved_);
         const double far = range + step * between_sides(vertices, first, way_);
-        if (gap_[number] - moved > far)
+        if (bound - moved > far)
           continue;
-        const double gap = gap_of(surface, x0, vertices, first);
-        measured_.push_back({number, gap, moved});
+        const double gap = gap_of(*surface_, x0, vertices, first);
+        measured_.push_back({number, p, gap, moved});
         if (!(gap > far))
-          step = collision_free_step(surface, vertices, first, x0, x1, separation, step);
+          step = collision_free_step(*surface_, vertices, first, x0, x1, separation, step);
       }
     });
   }

@@ -108,7 +108,8 @@ void BroadPhase::find(const CollisionSurface& surface, std::span<const Vec3> x0,
   };
   set_boxes(box_of);
 
-  const auto add = [&](const auto& first, const auto& second, auto& list) {
+  std::array<std::vector<double>, 4> gaps;
+  const auto add = [&](const auto& first, const auto& second, auto& list, auto& gaps_of_list) {
     constexpr std::size_t k = std::tuple_size_v<std::remove_cvref_t<decltype(first)>>;
     constexpr std::size_t n = k + std::tuple_size_v<std::remove_cvref_t<decltype(second)>>;
     std::array<std::uint32_t, n> vertices;
@@ -126,22 +127,23 @@ void BroadPhase::find(const CollisionSurface& surface, std::span<const Vec3> x0,
             surface.is_held(vertices[j], surface.owner[vertices[i]]))
           return;
     const auto from = positions(x0, vertices), to = positions(x1, vertices);
-    const double distance = std::sqrt(squared_distance(closest_feature(from, k), from));
-    const double most =
-        radius_sum(surface, vertices[0], vertices[n - 1]) + reach + motion_bound(from, to, k);
-    if (!(distance > most)) // NaN stays
-      list.push_back(vertices);
+    const double gap = std::sqrt(squared_distance(closest_feature(from, k), from)) -
+                       radius_sum(surface, vertices[0], vertices[n - 1]);
+    if (gap > reach + motion_bound(from, to, k))
+      return; // NaN stays
+    list.push_back(vertices);
+    gaps_of_list.push_back(gap);
   };
   // Of two owners, or of one and itself.
   const auto meet_all = [&](Primitives& a, const auto& vertices_a, Primitives& b,
-                            const auto& vertices_b, auto& list) {
+                            const auto& vertices_b, auto& list, std::vector<double>& gaps_of_list) {
     if (a.number.empty() || b.number.empty())
       return;
     refit(a, box_of, vertices_a);
     refit(b, box_of, vertices_b);
     find_pairs(a, b);
     for (const auto& [i, j] : pairs_)
-      add(vertices_a(i), vertices_b(j), list);
+      add(vertices_a(i), vertices_b(j), list, gaps_of_list);
   };
   const std::size_t owners = std::min(owners_.size(), allowed.owners());
   for (std::size_t i = 0; i < owners; ++i)
@@ -149,15 +151,18 @@ void BroadPhase::find(const CollisionSurface& surface, std::span<const Vec3> x0,
       Owner &a = owners_[i], &b = owners_[j];
       if (!allowed.at(i, j) || !meet(a.box, b.box))
         continue;
-      meet_all(a.points, point, b.triangles, triangle, candidates.point_triangle);
+      meet_all(a.points, point, b.triangles, triangle, candidates.point_triangle, gaps[3]);
       if (i != j)
-        meet_all(b.points, point, a.triangles, triangle, candidates.point_triangle);
-      meet_all(a.edges, edge, b.edges, edge, candidates.edge_edge);
-      meet_all(a.lone_points, point, b.lone_edges, edge, candidates.point_edge);
+        meet_all(b.points, point, a.triangles, triangle, candidates.point_triangle, gaps[3]);
+      meet_all(a.edges, edge, b.edges, edge, candidates.edge_edge, gaps[2]);
+      meet_all(a.lone_points, point, b.lone_edges, edge, candidates.point_edge, gaps[1]);
       if (i != j)
-        meet_all(b.lone_points, point, a.lone_edges, edge, candidates.point_edge);
-      meet_all(a.lone_points, point, b.lone_points, point, candidates.point_point);
+        meet_all(b.lone_points, point, a.lone_edges, edge, candidates.point_edge, gaps[1]);
+      meet_all(a.lone_points, point, b.lone_points, point, candidates.point_point, gaps[0]);
     }
+  gaps_.clear();
+  for (const std::vector<double>& of_list : gaps)
+    gaps_.insert(gaps_.end(), of_list.begin(), of_list.end());
 }
 
 std::vector<Intersection> BroadPhase::find_intersections(const CollisionSurface& surface,

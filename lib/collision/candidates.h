@@ -56,6 +56,8 @@ public:
   /// \param candidates  overwritten; keeps its memory. Order: by pairs of owners, then by number
   void find(const CollisionSurface& surface, std::span<const Vec3> x0, std::span<const Vec3> x1,
             double reach, const AllowedPairs& allowed, Candidates& candidates);
+  /// Gaps (distance minus d_min) at x0 of the candidates found last, one list behind the other.
+  std::span<const double> gaps() const noexcept { return gaps_; }
 
   /// Finds edges that intersect triangles at x, for owners that may touch. Pairs with a vertex in
   /// common are left out. The test is exact and includes touching. Primitives with a radius are
@@ -86,6 +88,7 @@ private:
 
   std::vector<Owner> owners_;
   std::vector<std::array<std::uint32_t, 2>> pairs_; ///< of find_pairs
+  std::vector<double> gaps_;
 };
 
 /// Vertices of all candidates, ascending, each once.

@@ -80,7 +80,7 @@ public:
   const std::vector<ContactForce>& forces() const { return pair_forces_; }
 
 private:
-  double typical_force(std::span<const Vec3> to) const;
+  double typical_force(std::span<const Vec3> to);
   void search(std::span<const Vec3> from, std::span<const Vec3> to, double reach);
   void find_pairs(std::span<const Vec3> x) { energy_.find_pairs(candidates_.near(x, d_hat_), x); }
   double energy_at(std::span<const Vec3> x) {
@@ -148,7 +148,7 @@ private:
 /// step, or, where the bodies collide on their ways to `to`, a part of the force that stops a
 /// vertex within the step. It scales the barrier, which becomes stiffer where forces turn out
 /// larger; one that is too stiff is a wall that Newton's steps bounce off.
-double StepSolver::Work::typical_force(std::span<const Vec3> to) const {
+double StepSolver::Work::typical_force(std::span<const Vec3> to) {
   const Parameters& p = options_.parameters;
   double force = std::numeric_limits<double>::infinity();
   for (const ContactBody* const body : island_.table.bodies)
@@ -438,12 +438,13 @@ bool StepSolver::Work::solve_round(const Round& round, double margin, bool& exac
       settled_ = false;
       break;
     }
-    if (report_.iterations + static_cast<std::uint64_t>(iteration) >= p.max_iterations)
+    if (report_.iterations >= p.max_iterations)
       throw NotSolved("contact: Newton's method did not converge in " +
                       std::to_string(p.max_iterations) + " iterations");
     bool done = false;
     const bool gained = iterate(*system, iteration, done);
     ++iteration;
+    ++report_.iterations;
     if (!gained && !done) {
       // Nothing to be gained by the simple Hessian, perhaps by the projected one.
       if (iteration <= p.gauss_newton) {
@@ -469,7 +470,6 @@ bool StepSolver::Work::solve_round(const Round& round, double margin, bool& exac
       last_step_ = std::numeric_limits<double>::infinity();
     }
   }
-  report_.iterations += static_cast<std::uint64_t>(iteration);
   report_.vertices = std::max(report_.vertices, system->unknowns() / 3);
   exact = move_bodies(*system, true);
   if (!follow_bodies(margin))

@@ -43,7 +43,7 @@ void SweptCandidates::search(std::span<const Vec3> from, std::span<const Vec3> t
   for (std::uint32_t v = 0; v < count; ++v)
     if (used[v] != 0)
       vertices_.push_back(v);
-  filter_.reset(candidates_, vertices_, from_);
+  filter_.reset(island_.surface, candidates_, broad_phase_.gaps(), vertices_, from_);
 }
 
 collision::Separation SweptCandidates::kept_gaps() const {
@@ -54,16 +54,15 @@ collision::Separation SweptCandidates::kept_gaps() const {
 }
 
 double SweptCandidates::free_part(std::span<const Vec3> from, std::span<const Vec3> to) {
-  return filter_.free_step(island_.surface, from, to, kept_gaps());
+  return filter_.free_step(from, to, kept_gaps());
 }
 
-bool SweptCandidates::keep_gaps(std::span<const Vec3> from, std::span<const Vec3> to) const {
-  return collision::collision_free_step(island_.surface, candidates_, from, to, kept_gaps()) >= 1;
+bool SweptCandidates::keep_gaps(std::span<const Vec3> from, std::span<const Vec3> to) {
+  return free_part(from, to) >= 1;
 }
 
-bool SweptCandidates::are_free(std::span<const Vec3> from, std::span<const Vec3> to) const {
-  return collision::collision_free_step(island_.surface, candidates_, from, to,
-                                        {0, 0, island_.activation_distance, max_advances}) >= 1;
+bool SweptCandidates::are_free(std::span<const Vec3> from, std::span<const Vec3> to) {
+  return filter_.free_step(from, to, {0, 0, island_.activation_distance, max_advances}) >= 1;
 }
 
 bool SweptCandidates::covers(std::uint32_t vertex, const Vec3& x, double room) const {

@@ -32,15 +32,15 @@ public:
 
   /// Candidates whose gap at x may be `range` or less. \return valid until the next call
   const collision::Candidates& near(std::span<const Vec3> x, double range) {
-    return filter_.select(island_.surface, x, range);
+    return filter_.select(x, range);
   }
   /// Largest part of the ways along which no surfaces use up more than a part of their gap.
   /// \pre only vertices() have ways
   double free_part(std::span<const Vec3> from, std::span<const Vec3> to);
   /// Whether that is all of the ways.
-  bool keep_gaps(std::span<const Vec3> from, std::span<const Vec3> to) const;
+  bool keep_gaps(std::span<const Vec3> from, std::span<const Vec3> to);
   /// Whether no surfaces meet on these ways.
-  bool are_free(std::span<const Vec3> from, std::span<const Vec3> to) const;
+  bool are_free(std::span<const Vec3> from, std::span<const Vec3> to);
 
   /// Whether all vertices at x, or those of vertices(), are within `room` of their ways.
   bool cover(std::span<const Vec3> x, double room) const;

@@ -415,9 +415,10 @@ struct FilteredSheets {
   CandidateFilter filter;
 
   FilteredSheets() {
-    BroadPhase(surface).find(surface, x, x, 2, AllowedPairs(4, 1), all);
+    BroadPhase broad_phase(surface);
+    broad_phase.find(surface, x, x, 2, AllowedPairs(4, 1), all);
     vertices = vertices_of(all);
-    filter.reset(all, vertices, x);
+    filter.reset(surface, all, broad_phase.gaps(), vertices, x);
   }
 };
 
@@ -441,7 +442,7 @@ TEST(CandidateFilter, SelectsWhatMeasuringAllSelects) {
     look(all.point_edge, false, expected.point_edge);
     look(all.edge_edge, true, expected.edge_edge);
     look(all.point_triangle, false, expected.point_triangle);
-    const Candidates& near = filter.select(surface, x, range);
+    const Candidates& near = filter.select(x, range);
     EXPECT_EQ(near.point_point, expected.point_point) << step;
     EXPECT_EQ(near.point_edge, expected.point_edge) << step;
     EXPECT_EQ(near.edge_edge, expected.edge_edge) << step;
@@ -466,13 +467,13 @@ TEST(CandidateFilter, GoesAsFarAsAllCandidatesAllow) {
     for (const std::uint32_t v : vertices)
       to[v] += together + size * random_point(random, 1);
     const double expected = collision_free_step(surface, all, x, to, separation);
-    const double found = filter.free_step(surface, x, to, separation);
+    const double found = filter.free_step(x, to, separation);
     EXPECT_EQ(found, expected) << step;
     (found < 1 ? stopped : passed) += 1;
     for (const std::uint32_t v : vertices)
       x[v] += 0.5 * found * (to[v] - x[v]);
     if (step % 3 == 0)
-      (void)filter.select(surface, x, 0.05);
+      (void)filter.select(x, 0.05);
   }
   EXPECT_GT(stopped, 20U);
   EXPECT_GT(passed, 20U);
