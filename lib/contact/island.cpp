@@ -17,6 +17,8 @@ namespace gewebe::contact {
 namespace {
 
 constexpr int max_halvings = 8;
+/// Steps that needed no more parts than the last one, behind which half as many are tried.
+constexpr int steps_in_parts = 4;
 
 /// Part of d_hat by which d_min of a radius is less than it, so that a typical force acts where the
 /// surfaces just touch.
@@ -196,25 +198,39 @@ void IslandMotion::step(Members members, double from, double to, const Context& 
     members[m]->end(forces[m], to - from, context);
 }
 
-void IslandMotion::advance_parts(Members members, double from, double to, int halvings,
-                                 const Context& context) {
-  try {
-    step(members, from, to, context);
-    return;
-  } catch (const IntersectsAtStart&) {
-    throw;
-  } catch (const NotSolved&) {
-    if (halvings == 0 || !(to > from))
+/// \param untried  halvings made without a try \param halvings  that are left
+/// \return how often it had to be halved
+int IslandMotion::advance_parts(Members members, double from, double to, int untried, int halvings,
+                                const Context& context) {
+  if (untried == 0 || !(to > from)) {
+    try {
+      step(members, from, to, context);
+      return 0;
+    } catch (const IntersectsAtStart&) {
       throw;
+    } catch (const NotSolved&) {
+      if (halvings == 0 || !(to > from))
+        throw;
+    }
+    ++report_.halvings;
   }
-  ++report_.halvings;
   const double middle = from + (to - from) / 2;
-  advance_parts(members, from, middle, halvings - 1, context);
-  advance_parts(members, middle, to, halvings - 1, context);
+  const int rest = std::max(untried - 1, 0);
+  const int first = advance_parts(members, from, middle, rest, halvings - 1, context);
+  const int second = advance_parts(members, middle, to, rest, halvings - 1, context);
+  return 1 + std::max(first, second);
 }
 
-void IslandMotion::advance(Members members, double from, double to, const Context& context) {
-  advance_parts(members, from, to, max_halvings, context);
+void IslandMotion::advance(Members members, double from, double to, StepParts& parts,
+                           const Context& context) {
+  const std::uint64_t before = report_.iterations;
+  const int needed = advance_parts(members, from, to, parts.halvings, max_halvings, context);
+  if (report_.iterations == before) // nothing touched
+    parts = {};
+  else if (needed > parts.halvings)
+    parts = {needed, 0};
+  else if (parts.halvings > 0 && ++parts.steps == steps_in_parts)
+    parts = {parts.halvings - 1, 0};
 }
 
 std::optional<Vec3> IslandMotion::find_intersection(std::span<const Vec3> x) const {

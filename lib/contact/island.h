@@ -72,6 +72,13 @@ public:
   virtual void end(std::span<const Force> forces, double h, const Context& context) = 0;
 };
 
+/// Into how many parts the last steps of bodies had to be halved, so that the next one need not
+/// fail first.
+struct StepParts {
+  int halvings = 0;
+  int steps = 0; ///< since then that needed no more
+};
+
 class RadiusFit;
 
 class IslandMotion {
@@ -83,11 +90,16 @@ public:
   ~IslandMotion();
 
   /// Steps from one time to the other, in halves where contact is not solved. \param members  one
-  /// for each surface
+  /// for each surface \param parts  of the last step; becomes those for the next one
   /// \throw NotSolved where the shortest step is not solved either: nothing has been ended since
   /// the last step that was; the caller rolls back
-  void advance(std::span<IslandMember* const> members, double from, double to,
+  void advance(std::span<IslandMember* const> members, double from, double to, StepParts& parts,
                const Context& context);
+  void advance(std::span<IslandMember* const> members, double from, double to,
+               const Context& context) {
+    StepParts none;
+    advance(members, from, to, none, context);
+  }
 
   /// Where an edge passes through a triangle. \param x  positions of all vertices
   std::optional<Vec3> find_intersection(std::span<const Vec3> x) const;
@@ -102,7 +114,8 @@ public:
 private:
   using Members = std::span<IslandMember* const>;
   void step(Members members, double from, double to, const Context& context);
-  void advance_parts(Members members, double from, double to, int halvings, const Context& context);
+  int advance_parts(Members members, double from, double to, int untried, int halvings,
+                    const Context& context);
 
   Parameters parameters_;
   std::unique_ptr<Island> island_;

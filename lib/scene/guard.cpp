@@ -10,6 +10,7 @@ namespace gewebe::simulation {
 
 void Body::restore(const Snapshot& was) {
   changed = was.changed;
+  step_parts = was.step_parts;
   rest_extents = was.rest_extents;
   moving->go_back(was.motion);
   failure = nullptr;

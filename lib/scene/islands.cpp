@@ -250,6 +250,10 @@ void advance_island(World& w, IslandParts& island, double to) {
     member.follow_load(start, to);
   const double count = std::max(1.0, std::ceil(duration / step * (1 - 1e-12)));
   const double h = duration / count;
+  contact::StepParts parts;
+  for (const auto& body : island.bodies)
+    if (body->step_parts.halvings > parts.halvings)
+      parts = body->step_parts;
   try {
     clear_jumps(w, island, *cache.motion, members, h);
     double taken = 0; // steps
@@ -257,7 +261,7 @@ void advance_island(World& w, IslandParts& island, double to) {
       const double begin = start + taken * h;
       ++taken;
       const double end = taken == count ? to : start + taken * h;
-      cache.motion->advance(members.all, begin, end, w.context);
+      cache.motion->advance(members.all, begin, end, parts, w.context);
       if (end < to && has_come_to_rest(w, island, end, to)) {
         sleep_on(w, island, to - end);
         break;
@@ -272,6 +276,8 @@ void advance_island(World& w, IslandParts& island, double to) {
       raise(w, *body);
     }
   }
+  for (const auto& body : island.bodies)
+    body->step_parts = parts;
   count_contact(w, cache.motion->take_report());
   for (const std::size_t index : island.statics)
     w.now.objects[index].in_motion = true;

@@ -5,6 +5,7 @@
 
 #include "base/copy_on_write.h"
 #include "contact/coupling.h"
+#include "contact/island.h"
 #include "contact/nodal_contact_force.h"
 #include "dynamics/body_motion.h"
 #include "dynamics/solid_dynamic.h"
@@ -104,14 +105,16 @@ struct Body {
   bool ahead = false;                           // it has moved since the scene was saved
   bool warned_step = false;
   std::uint64_t taken = 0; // integration steps of the last advance
+  contact::StepParts step_parts{};
   std::exception_ptr failure;
 
   struct Snapshot {
     bool changed = true;
+    contact::StepParts step_parts{};
     std::map<std::size_t, Extent> rest_extents{};
     std::any motion;
   };
-  Snapshot snapshot() const { return {changed, rest_extents, moving->snapshot()}; }
+  Snapshot snapshot() const { return {changed, step_parts, rest_extents, moving->snapshot()}; }
   void restore(const Snapshot& was);
 };
 
