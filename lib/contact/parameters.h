@@ -57,7 +57,7 @@ struct Parameters {
   int max_way_lags = 100, max_lags = 30;
   int whole_lags = 4;         ///< behind so many of each, normal forces take half of their changes
   int max_searches = 5;       ///< broad phases of one step, each with twice the margin
-  int max_way_searches = 100; ///< ... where vertices leave what was searched
+  int max_way_searches = 40; ///< ... where vertices leave what was searched
 
   // ---- tolerances
   /// Largest last step of Newton's method, over the smaller of d_hat and the stick length.
