@@ -35,9 +35,9 @@ struct Parameters {
 
   // ---- iterations
   /// Newton iterations of one round that is at the end of all ways, then bodies are linearised
-  /// anew; those of a step, then it fails.
+  /// anew; those of a step, then it fails: in time, where halves are quicker, and at rest.
   int round_iterations = 100;
-  std::uint64_t max_iterations = 300;
+  std::uint64_t max_iterations = 300, max_iterations_at_rest = 1000;
   int max_rounds = 40; ///< linearisations of bodies that are not linear
   /// Where more rounds than this are still to be expected, bodies are linearised by better models.
   double slow_rounds = 8;

@@ -418,6 +418,7 @@ bool StepSolver::Work::follow_bodies(double margin) {
 /// met something outside the searched region; else trial_ is the end
 bool StepSolver::Work::solve_round(const Round& round, double margin, bool& exact) {
   const Parameters& p = options_.parameters;
+  const std::uint64_t most = options_.h > 0 ? p.max_iterations : p.max_iterations_at_rest;
   const auto make_system = [&](std::span<const std::vector<VertexForce>> force, double share) {
     const std::span<const std::uint32_t> vertices = candidates_.vertices();
     return std::make_unique<CondensedSystem>(
@@ -438,9 +439,9 @@ bool StepSolver::Work::solve_round(const Round& round, double margin, bool& exac
       settled_ = false;
       break;
     }
-    if (report_.iterations >= p.max_iterations)
-      throw NotSolved("contact: Newton's method did not converge in " +
-                      std::to_string(p.max_iterations) + " iterations");
+    if (report_.iterations >= most)
+      throw NotSolved("contact: Newton's method did not converge in " + std::to_string(most) +
+                      " iterations");
     bool done = false;
     const bool gained = iterate(*system, iteration, done);
     ++iteration;

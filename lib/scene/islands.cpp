@@ -529,10 +529,9 @@ void Rule<SetContact>::apply(World& w, const SetContact& c) {
   if (!c.separate)
     require_apart(w, rule);
   separate(w, c);
-  if (c.separate) {
-    require_outside(w, rule);
+  require_outside(w, rule, c.separate);
+  if (c.separate)
     let_instruments_enter(w);
-  }
   const auto known = std::ranges::find_if(w.now.contacts, [&](const ContactRule& other) {
     return std::minmax(other.object, other.other) == std::minmax(c.object, c.other);
   });

@@ -519,11 +519,13 @@ std::vector<std::uint32_t> vertices_of_components(const contact::BodySurface& su
 
 } // namespace
 
-void require_outside(World& w, const ContactRule& rule) {
+void require_outside(World& w, const ContactRule& rule, bool any) {
   if (rule.object == rule.other)
     return;
   for (const auto& [inner, outer] :
        {std::pair(rule.object, rule.other), std::pair(rule.other, rule.object)}) {
+    if (!any && !is_solid(w.now.objects[outer]))
+      continue;
     const contact::ModelSurface of_inner = contact::model_surface(w.now.objects[inner].model());
     const contact::ModelSurface of_outer = contact::model_surface(w.now.objects[outer].model());
     if (!is_closed(of_outer.surface))

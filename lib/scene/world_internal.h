@@ -192,8 +192,9 @@ Pose entry_pose(World& w, const InstrumentShape& shape, const Pose& pose);
 /// \throw Error naming objects and position
 void require_apart(World& w, const ContactRule& rule);
 /// Requires that no connected part of either surface is inside the other one, where that is closed.
+/// \param any  also where that is a net, which is hollow
 /// \pre they do not intersect \throw Error naming objects and position
-void require_outside(World& w, const ContactRule& rule);
+void require_outside(World& w, const ContactRule& rule, bool any);
 
 // time.cpp: steps through events
 void advance(World& w, double to);
