@@ -641,6 +641,193 @@ class Pendulum(Case):
                                                             for p, q in zip(window, window[1:])), 2, "mm/s")
 
 
+class Brake(Case):
+    """A block slides down a slope of 25 degrees that becomes level: mu g brings it to rest, where it stays.
+
+    Its way is that of backward Euler steps with these accelerations.
+    """
+
+    name, source = "brake", "Coulomb: kinetic friction against a motion"
+    mu, angle, falls = 0.3, 25.0, 0.1
+
+    def build(self, s):
+        slab(s, self.mesh, young=1e6)
+        b = block(s, self.mesh, "block", (10, 10, 0.01), young=1e6)
+        s.contact("slab", "block", self.mu)
+        s.gravity()
+        s.emit("shapes", "forces")
+        self.settled = s.steps(0.1)
+        s.gravity(self.angle)
+        self.slides = s.steps(self.falls)
+        s.gravity()
+        self.brakes = s.steps(0.2)
+        self.faces = [("block", b.where(lambda p: p[2] < 0.011), (0, 0, 1))]
+
+    def judge(self, s, frames):
+        x = [s.models["block"].centre(f.shapes["block"])[0] for f in frames]
+        a = math.radians(self.angle)
+        faster = GRAVITY * (math.sin(a) - self.mu * math.cos(a))
+        speed, way = 0.0, 0.0
+        for _ in range(self.slides):
+            speed += self.dt * faster
+            way += self.dt * speed
+        first = self.settled + self.slides
+        slower = math.floor(speed / (self.mu * GRAVITY * self.dt))  # steps in which it moves to their end
+        while speed > 0:
+            speed = max(0.0, speed - self.dt * self.mu * GRAVITY)
+            way += self.dt * speed
+        yield near("way until it rests", x[-1] - x[self.settled - 1], way, 0.01 * way, "mm")
+        window = frames[first: first + slower]
+        # The block shears back where the slope goes: the mean of the rest counts.
+        ratio = mean(-self.force(f, "block")[0] for f in window) / mean(self.force(f, "block")[2] for f in window)
+        yield near("tangential over normal force while it brakes", ratio, self.mu, 0.01 * self.mu)
+        yield at_most("way behind its rest", max(abs(x[-1] - v) for v in x[first + slower + 3:]), 2 * EPS_V * 0.2 + 0.01, "mm")
+
+
+class Belt(Case):
+    """A block on a belt that runs by 60 mm in 0.25 s, by 3 t^2 - 2 t^3, with up to twice the acceleration mu g.
+
+    Where it slips, mu g takes it along. Its way is that of backward Euler steps with this acceleration.
+    """
+
+    name, source = "belt", "Coulomb: kinetic friction that drives"
+    mu, way, lasts = 0.3, 60.0, 0.25
+
+    def build(self, s):
+        cells = (4, 2, 1) if self.mesh == "coarse" else (16, 4, 1)
+        s.solid("slab", box(cells, (160, 40, 5), (0, 0, -5)), 1e5)
+        b = block(s, self.mesh, "block", (70, 10, 0.01))
+        s.contact("slab", "block", self.mu)
+        s.gravity()
+        s.emit("shapes", "forces")
+        s.line("displace slab all 0 0 0")
+        self.settled = s.steps(0.1)
+        self.runs = round(self.lasts / self.dt)
+        s.line(f"displace slab all {self.way!r} 0 0 over {self.runs * self.dt!r}")
+        s.lines += ["step"] * self.runs
+        self.closed = False  # forces of the belt's support are told among the others
+        self.faces = [("block", b.where(lambda p: p[2] < 0.011), (0, 0, 1))]
+
+    def judge(self, s, frames):
+        x = [s.models["block"].centre(f.shapes["block"])[0] for f in frames]
+        at = lambda k: self.way * (3 - 2 * k / self.runs) * (k / self.runs) ** 2
+        way, speed, slips, most = 0.0, 0.0, [], self.dt * self.mu * GRAVITY
+        for k in range(1, self.runs + 1):
+            belt = (at(k) - at(k - 1)) / self.dt
+            if speed + most < belt:
+                slips.append(k)
+            speed = min(max(belt, speed - most), speed + most)
+            way += self.dt * speed
+        yield near("way of the block", x[-1] - x[self.settled - 1], way, 0.01 * way, "mm")
+        # A block that is not rigid shears before it is drawn along: at first it falls back by 2 to 3 mm/s.
+        yield near("lag behind the belt", self.way - (x[-1] - x[self.settled - 1]), self.way - way, 0.3, "mm")
+        window = [frames[self.settled + k - 1] for k in slips]
+        if window:
+            ratio = mean(self.force(f, "block")[0] for f in window) / mean(self.force(f, "block")[2] for f in window)
+            yield near("tangential over normal force while it slips", ratio, self.mu, 0.01 * self.mu)
+
+
+class Push(Case):
+    """A plate pushes a block over a table, by 3 t^2 - 2 t^3: it feels mu m g and what the acceleration takes."""
+
+    name, source = "push", "Coulomb"
+    mu, way, lasts = 0.3, 20.0, 1.0
+
+    def build(self, s):
+        slab(s, self.mesh)
+        block(s, self.mesh, "block", (20, 10, 0.01), turn=0.0)
+        s.contact("slab", "block", self.mu)
+        s.gravity()
+        turn = "turn 0 1 0 90"
+        start = 20.0 - 2.6 - 0.5 - 1.0
+        s.mesh_instrument("plate", plate((6, 30, 2)), (start, 20, 5), turn)
+        s.emit("shapes", "forces", "instruments")
+        s.steps(0.1)
+        self.runs = round(self.lasts / self.dt)
+        s.line(f"move plate {start + self.way!r} 20 5 {turn} over {self.runs * self.dt!r}")
+        s.lines += ["step"] * self.runs
+
+    def judge(self, s, frames):
+        weight = s.models["block"].weight * GRAVITY
+        mass = s.models["block"].weight
+        run = frames[-self.runs:]
+        for name, first, last in (("while it becomes faster", 0.45, 0.5), ("while it becomes slower", 0.75, 0.95)):
+            some = range(round(first * self.runs), round(last * self.runs))
+            force = -mean(run[k].instruments["plate"][1][0] for k in some)
+            gains = mean(6 * self.way / (self.runs * self.dt) ** 2 * (1 - 2 * (k + 0.5) / self.runs) for k in some)
+            yield near(f"force on the plate over theory, {name}", force / (mass * (self.mu * GRAVITY + gains)), 1, 0.01)
+        yield near("normal force over m g", -mean(self.force(f, "slab")[2] for f in run[self.runs // 2:]) / (mass * GRAVITY), 1, 0.01)
+
+
+class Ladder(Case):
+    """A board of length L and thickness t leans at a smooth wall: it holds where tan(angle) < 2 mu + t / L.
+
+    `angle` is that against the vertical. Moments about its foot give the force of the wall, W (tan(angle) - t / L) / 2, which
+    is that of friction at the foot.
+    """
+
+    name, source = "ladder", "statics: moments about the foot; Coulomb"
+    mu, angle, long, thick = 0.4, 38.0, 60.0, 4.0
+
+    def build(self, s):
+        a, t = math.radians(self.angle), self.thick
+        n = {"aligned": (1, 2, 10), "turned": (2, 3, 13), "coarse": (1, 1, 5)}[self.mesh]
+        along, across = (math.sin(a), math.cos(a)), (math.cos(a), -math.sin(a))
+        lowest = -t / 2 * math.sin(a)
+        at = lambda p: (p[2] * along[0] + p[0] * across[0], p[1], p[2] * along[1] + p[0] * across[1] - lowest + 0.01)
+        s.solid("board", mapped(box(n, (t, 10, self.long), (-t / 2, -5, 0)), at), 1e6, drag=5)
+        wall = self.long * math.sin(a) + t / 2 * math.cos(a) + 0.01
+        cells = (1, 1, 1) if self.mesh == "coarse" else (1, 3, 3)
+        s.solid("wall", box(cells, (5, 40, 40), (wall, -20, self.long * math.cos(a) - 20)), 1e6, fix=f"x>{wall + 4.99!r}")
+        s.solid("floor", box((*cells[1:], 1), (60, 40, 5), (-40, -20, -5)), 1e6, fix="z<-4.99")
+        s.contact("board", "wall")
+        s.contact("board", "floor", self.mu)
+        s.gravity()
+        s.emit("shapes", "forces")
+        self.count = s.steps(0.5)
+
+    def judge(self, s, frames):
+        board = s.models["board"]
+        moved = [norm(sub(board.centre(f.shapes["board"]), board.centre())) for f in frames]
+        if math.tan(math.radians(self.angle)) < 2 * self.mu + self.thick / self.long:
+            yield at_most("way of the board that holds", moved[-1], 0.5, "mm")
+            window = frames[-self.count // 4:]
+            push = mean(self.force(f, "wall")[0] for f in window)
+            theory = board.weight * GRAVITY * (math.tan(math.radians(self.angle)) - self.thick / self.long) / 2
+            yield near("force on the wall over theory", push / theory, 1, 0.02)
+            # Below, the same force: the wall is smooth.
+            yield near("force of friction on the floor over that on the wall", -mean(self.force(f, "floor")[0] for f in window) / push, 1, 0.01)
+        else:
+            yield at_least("way of the board that slips", moved[-1], 5, "mm")
+
+
+class Groove(Case):
+    """A ball in a groove of two smooth planes at 45 degrees: each bears W / sqrt(2)."""
+
+    name, source = "groove", "statics"
+
+    def build(self, s):
+        cells = {"aligned": 4, "turned": 5, "coarse": 3}[self.mesh]
+        b = s.solid("ball", ball(cells, 8.0, (0, 0, 8 * math.sqrt(2) + 0.02), degrees=turn_of(self.mesh)), 2e4, drag=20)
+        n = 1 if self.mesh == "coarse" else 4
+        for name, side in (("left", -1), ("right", 1)):
+            s.solid(name, mapped(box((n, n, 1), (30, 30, 4), (-5, -15, -4)), lambda p: turned((side * p[0], p[1], p[2]), (0, 1, 0), -side * 45)),
+                    1e5, fix="all")
+            s.contact(name, "ball")
+        s.gravity()
+        s.emit("shapes", "forces")
+        self.count = s.steps(0.6)
+        self.weight = b.weight * GRAVITY
+
+    def judge(self, s, frames):
+        window = frames[-self.count // 4:]
+        for name, side in (("left", -1), ("right", 1)):
+            force = mean(dot(self.force(f, name), (side / math.sqrt(2), 0, -1 / math.sqrt(2))) for f in window)
+            yield near(f"normal force of the {name} plane over W / sqrt(2)", force / self.weight * math.sqrt(2), 1, 0.01)
+            along = max(abs(dot(self.force(f, name), (1 / math.sqrt(2), 0, side / math.sqrt(2)))) for f in window)
+            yield at_most(f"force along the {name} plane over W", along / self.weight, 1e-3)
+
+
 class Plate(Case):
     """A block between a frictionless base and a wide rigid plate without friction: uniform stress, F = E A d / h.
 
@@ -1296,6 +1483,12 @@ def cases():
     full(Topple, beyond=-1.0, quick=(13,))
     full(Topple, beyond=1.0, quick=(13,))
     full(Pendulum, quick=(1,))
+    full(Brake, quick=(1,))
+    full(Belt, quick=(7,))
+    full(Push, quick=(1,))
+    full(Ladder, angle=38.0, quick=(1,))
+    full(Ladder, angle=44.0, quick=(7,))
+    full(Groove, quick=(1,))
     full(Hole, quick=(1,))
     full(Hole, angle=35.0, mu=0.2)
     full(House)
