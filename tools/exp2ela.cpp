@@ -70,8 +70,10 @@ void work(cli::Run& run, ModelArguments& a) {
     fix(model, a);
   if (!a.fit.empty())
     cli::fit_model(run, model, a.fit);
-  if (to == Kind::ela)
+  if (to == Kind::ela) {
     cli::warn_of_hinges(run, model);
+    cli::warn_of_laws(run, model);
+  }
   hold_step(run, model, a);
   run.timed("write", [&] {
     if (to == Kind::ela)

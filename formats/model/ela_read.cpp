@@ -341,7 +341,9 @@ private:
       m.damping_ratio = in_.number<double>("damping ratio");
       if (!in_.at_end())
         m.poisson = in_.number<double>("Poisson's ratio");
-      in_.end_line(7);
+      if (!in_.at_end())
+        m.law = parse_law(in_.word());
+      in_.end_line(8);
       model_.materials.push_back(std::move(m));
       check_.material(i);
     }

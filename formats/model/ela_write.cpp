@@ -104,7 +104,8 @@ void emit_model(const Sink& sink, const Model& m, const Context& context,
     const Material& k = m.materials[i];
     sink(std::to_string(i) + " \"" + k.name + "\" " + number_text(k.density) + " " +
          number_text(k.young) + " " + number_text(k.thickness) + " " +
-         number_text(k.damping_ratio) + (k.poisson ? " " + number_text(*k.poisson) : "") + "\n");
+         number_text(k.damping_ratio) + (k.poisson ? " " + number_text(*k.poisson) : "") +
+         (k.law ? " " + law_text(*k.law) : "") + "\n");
   }
   emit(sink, context, "nodes", m.nodes.size(), [&](std::size_t i, LineWriter& line) {
     const Node& n = m.nodes[i];

@@ -115,6 +115,7 @@ std::vector<SolidElement> solid_elements(const TetMesh& mesh,
       if (!(tetrahedron_volume(corners[0], corners[1], corners[2], corners[3]) > 0))
         throw Error("tetrahedron " + std::to_string(t) + " has no positive volume");
       elements[t] = solid_element(corners, elasticities[m]);
+      elements[t].law = materials[m].law;
     }
   });
   return elements;

@@ -22,6 +22,7 @@ struct SolidMaterial {
   double young = 1e4;    ///< Young's modulus, Pa
   double poisson = 0.49; ///< Poisson's ratio, 0 to below 1/2
   double density = 1e-3; ///< g/mm³
+  HyperelasticLaw law{}; ///< of large strains (fem/hyperelastic.h)
 };
 
 /// The elements of a mesh whose tetrahedra are of materials[mesh.material[t]], or all of the first.

@@ -31,6 +31,7 @@
 
 #include "geometry/vec3.h"
 #include "linalg/stiffness.h"
+#include "model/hyperelastic_law.h"
 
 #include <array>
 #include <cstddef>
@@ -56,6 +57,7 @@ struct SolidElement {
   std::array<Vec3, 4> gradient{}; ///< of the barycentric coordinates, 1/mm
   Elasticity material;
   SymmetricBlock bubble_flexibility{}; ///< (∫b)² times the inverse of the bubble's own stiffness
+  HyperelasticLaw law;                 ///< of large strains (fem/hyperelastic.h)
 };
 
 /// \throw Error unless the volume is finite and positive (as the corners are ordered)

@@ -3,6 +3,8 @@
 #include "base/cpu.h"
 #include "fem/hyperelastic_kernel_internal.h"
 #include "fem/matrix3_internal.h"
+#include "fem/modified_law_internal.h"
+#include "numeric/logarithm.h"
 #include "tetrahedra/tet_mesh.h"
 
 #include <Eigen/Cholesky>
@@ -88,19 +90,25 @@ SolidBlock cofactors(const SolidBlock& f) {
           f[1] * f[5] - f[2] * f[4], f[2] * f[3] - f[0] * f[5], f[0] * f[4] - f[1] * f[3]};
 }
 
-/// Of both laws dW/dF = a F + d cof F and d²W/dF² = a 1 + b F ⊗ F + c cof F ⊗ cof F + d d²J/dF².
+/// Of Neo-Hookean laws dW/dF = a F + d cof F and d²W/dF² = a 1 + b F ⊗ F + c cof F ⊗ cof F + d
+/// d²J/dF².
 struct Derivatives {
   double energy = 0, a = 0, b = 0, c = 0, d = 0;
 };
 
-Derivatives derivatives(HyperelasticLaw law, double mu, double i_c, double j) {
-  if (law == HyperelasticLaw::neo_hookean) {
+bool is_neo_hookean(const HyperelasticLaw& law) {
+  return law.kind == HyperelasticLaw::stable_neo_hookean ||
+         law.kind == HyperelasticLaw::neo_hookean;
+}
+
+Derivatives derivatives(const HyperelasticLaw& law, double mu, double i_c, double j) {
+  if (law.kind == HyperelasticLaw::neo_hookean) {
     if (!(j > 0))
       return {.energy = HUGE_VAL};
-    return {mu / 2 * (i_c - 3) - mu * std::log(j), mu, 0, mu / (j * j), -mu / j};
+    return {mu / 2 * (i_c - 3) - mu * natural_logarithm(j), mu, 0, mu / (j * j), -mu / j};
   }
   const double shear = 2.0 / 3 * mu, below = i_c + 1;
-  return {shear * (i_c - 3) - shear * std::log(below / 4) - mu * (j - 1) +
+  return {shear * (i_c - 3) - shear * natural_logarithm(below / 4) - mu * (j - 1) +
               5.0 / 12 * mu * (j - 1) * (j - 1),
           2 * shear * (1 - 1 / below), 4 * shear / (below * below), 5.0 / 6 * mu,
           -mu + 5.0 / 6 * mu * (j - 1)};
@@ -114,24 +122,18 @@ struct Point {
   Derivatives w;
 };
 
-using Tangent = Eigen::Matrix<double, 9, 9>;
-
-/// The second derivative by F, rows and columns 3 i + j of F_ij, its eigenvalues at least `least`.
-Tangent positive_derivative(const Point& q, double d, double least) {
-  Tangent m = Tangent::Identity() * q.w.a;
+/// The second derivative by F, its pressure held.
+SecondDerivative second_derivative(const Point& q, double d) {
+  SecondDerivative m = SecondDerivative::Identity() * q.w.a;
   const Eigen::Map<const Eigen::Matrix<double, 9, 1>> f(q.f.data()), cofactor(q.cofactor.data());
   m += q.w.b * f * f.transpose() + q.w.c * cofactor * cofactor.transpose();
-  // d²J/dF_ij dF_kl = ε_ikm ε_jln F_mn.
-  for (int i = 0; i < 3; ++i)
-    for (int j = 0; j < 3; ++j)
-      for (const int s : {1, 2})
-        for (const int t : {1, 2}) {
-          const int k = (i + s) % 3, l = (j + t) % 3, row = (i + 3 - s) % 3,
-                    column = (j + 3 - t) % 3;
-          m(3 * i + j, 3 * k + l) +=
-              (s == t ? d : -d) * q.f[static_cast<std::size_t>(3 * row + column)];
-        }
-  const Eigen::SelfAdjointEigenSolver<Tangent> solver(m);
+  add_cofactor_slope(q.f, d, m);
+  return m;
+}
+
+/// The same with eigenvalues of at least `least`.
+SecondDerivative positive(const SecondDerivative& m, double least) {
+  const Eigen::SelfAdjointEigenSolver<SecondDerivative> solver(m);
   return solver.eigenvectors() * solver.eigenvalues().cwiseMax(least).asDiagonal() *
          solver.eigenvectors().transpose();
 }
@@ -154,9 +156,8 @@ void add_tangent(const Point& q, double d, std::size_t count, TangentSums& sums)
   add(point, count, sums);
 }
 
-void add_positive_tangent(const Point& q, double d, double least, std::size_t count,
-                          HyperelasticResponse& response) {
-  const Tangent m = positive_derivative(q, d, least);
+void add_tangent(const Point& q, const SecondDerivative& m, std::size_t count,
+                 HyperelasticResponse& response) {
   for (std::size_t b = 0; b < count; ++b) {
     Eigen::Matrix<double, 9, 3> columns;
     for (int k = 0; k < 3; ++k)
@@ -175,14 +176,16 @@ void add_positive_tangent(const Point& q, double d, double least, std::size_t co
 
 } // namespace
 
-void hyperelastic_response(const SolidElement& element, HyperelasticLaw law,
-                           std::span<const Vec3> u, const Vec3& bubble, HyperelasticPart part,
-                           HyperelasticResponse& response) {
+void hyperelastic_response(const SolidElement& element, std::span<const Vec3> u, const Vec3& bubble,
+                           HyperelasticPart part, HyperelasticResponse& response) {
   const bool quadratic = u.size() == 10;
   const std::size_t count = quadratic ? 11 : 4;
   const auto [lambda, mu] = element.material;
   const std::span<const IntegrationPoint> at = points_of(quadratic);
+  const HyperelasticLaw& law = element.law;
+  const bool neo_hookean = is_neo_hookean(law), wants_second = part >= HyperelasticPart::tangent;
   std::array<Point, 24> points;
+  std::vector<LawResponse> modified(neo_hookean ? 0 : at.size());
   std::array<double, 4> moment{}; // ∫ λp J over the volume
   response.energy = 0;
   for (std::size_t n = 0; n < at.size(); ++n) {
@@ -197,10 +200,15 @@ void hyperelastic_response(const SolidElement& element, HyperelasticLaw law,
               (a < 10 && a < u.size() ? u[a] : bubble)[i] * q.gradient[a][j];
     q.cofactor = cofactors(q.f);
     const double j = q.f[0] * q.cofactor[0] + q.f[1] * q.cofactor[1] + q.f[2] * q.cofactor[2];
-    double i_c = 0;
-    for (const double value : q.f)
-      i_c += value * value;
-    q.w = derivatives(law, mu, i_c, j);
+    if (neo_hookean) {
+      double i_c = 0;
+      for (const double value : q.f)
+        i_c += value * value;
+      q.w = derivatives(law, mu, i_c, j);
+    } else {
+      modified_law(law, mu, q.f, q.cofactor, j, wants_second, modified[n]);
+      q.w.energy = modified[n].energy;
+    }
     if (q.w.energy == HUGE_VAL) {
       response.energy = HUGE_VAL;
       return;
@@ -232,17 +240,22 @@ void hyperelastic_response(const SolidElement& element, HyperelasticLaw law,
     double d = q.w.d;
     for (std::size_t p = 0; p < 4; ++p)
       d += at[n].at[p] * pressure[p];
-    SolidBlock stress;
+    SolidBlock stress = neo_hookean ? SolidBlock{} : modified[n].stress;
     for (std::size_t k = 0; k < 9; ++k)
-      stress[k] = q.w.a * q.f[k] + d * q.cofactor[k];
+      stress[k] = neo_hookean ? q.w.a * q.f[k] + d * q.cofactor[k] : stress[k] + d * q.cofactor[k];
     for (std::size_t a = 0; a < count; ++a)
       response.force[a] -= q.weight * product(stress, q.gradient[a]);
     if (part == HyperelasticPart::force)
       continue;
-    if (part == HyperelasticPart::tangent)
+    if (part == HyperelasticPart::tangent && neo_hookean) {
       add_tangent(q, d, count, sums);
-    else
-      add_positive_tangent(q, d, 1e-3 * mu, count, response);
+    } else {
+      SecondDerivative m = neo_hookean ? second_derivative(q, d) : modified[n].second;
+      if (!neo_hookean)
+        add_cofactor_slope(q.f, d, m);
+      add_tangent(q, part == HyperelasticPart::tangent ? m : positive(m, 1e-3 * mu), count,
+                  response);
+    }
     for (std::size_t a = 0; a < count; ++a) {
       const Vec3 of_j = product(q.cofactor, q.gradient[a]) * at[n].weight;
       for (std::size_t p = 0; p < 4; ++p)
@@ -251,7 +264,7 @@ void hyperelastic_response(const SolidElement& element, HyperelasticLaw law,
   }
   if (part == HyperelasticPart::force)
     return;
-  if (part == HyperelasticPart::tangent)
+  if (part == HyperelasticPart::tangent && neo_hookean)
     for (std::size_t k = 0; k < 9; ++k)
       for (std::size_t a = 0; a < count; ++a)
         for (std::size_t b = a; b < count; ++b)
@@ -287,7 +300,8 @@ namespace {
 /// and so J = J0 + w · cof F0 g: the projected part is quadratic, and W needs two products a point.
 class BubbleEnergy {
 public:
-  BubbleEnergy(const SolidElement& element, std::span<const Vec3> u) : mu_(element.material.mu) {
+  BubbleEnergy(const SolidElement& element, std::span<const Vec3> u)
+      : mu_(element.material.mu), law_(element.law), neo_hookean_(is_neo_hookean(law_)) {
     const std::span<const IntegrationPoint> at = points_of(true);
     std::array<double, 4> moment{};
     std::array<Eigen::Vector3d, 4> slope;
@@ -295,13 +309,14 @@ public:
     for (std::size_t n = 0; n < at.size(); ++n) {
       Part& q = parts_[n];
       const Gradients gradient = gradients_at(element, at[n].at, true);
-      SolidBlock f{1, 0, 0, 0, 1, 0, 0, 0, 1};
+      SolidBlock& f = q.f;
       for (std::size_t a = 0; a < 10; ++a)
         for (int i = 0; i < 3; ++i)
           for (int j = 0; j < 3; ++j)
             f[static_cast<std::size_t>(3 * i + j)] += u[a][i] * gradient[a][j];
       const SolidBlock cofactor = cofactors(f);
       q.weight = at[n].weight * element.volume;
+      q.gradient = gradient[10];
       q.square = dot(gradient[10], gradient[10]);
       q.along = eigen(product(f, gradient[10]));
       q.of_j = eigen(product(cofactor, gradient[10]));
@@ -330,15 +345,15 @@ public:
     energy_ = constant_ + w.dot(linear_) + w.dot(square_ * w) / 2;
     gradient_ = linear_ + square_ * w;
     second_ = square_;
-    for (const Part& q : parts_) {
-      const Eigen::Vector3d along = q.along + q.square * w;
-      const Derivatives d = derivatives(HyperelasticLaw::stable_neo_hookean, mu_,
-                                        q.i_c + w.dot(q.along + along), q.j + w.dot(q.of_j));
-      energy_ += q.weight * d.energy;
-      gradient_ += q.weight * (d.a * along + d.d * q.of_j);
-      second_ += q.weight * (d.b * along * along.transpose() + d.c * q.of_j * q.of_j.transpose());
-      second_.diagonal().array() += q.weight * q.square * (d.a + 1e-9 * mu_); // definite if flat
-    }
+    for (const Part& q : parts_)
+      if (neo_hookean_)
+        add_neo_hookean(q, w);
+      else
+        add_modified(q, w);
+    if (!std::isfinite(energy_))
+      energy_ = HUGE_VAL;
+    else if (!neo_hookean_)
+      make_positive();
     return energy_;
   }
   const Eigen::Vector3d& gradient() const { return gradient_; }
@@ -348,8 +363,50 @@ private:
   struct Part {
     double weight = 0, square = 0, j = 0, i_c = 0; ///< times the volume; |g|²; of w = 0
     Eigen::Vector3d along, of_j;                   ///< F0 g, cof F0 g
+    Vec3 gradient;                                 ///< g
+    SolidBlock f{1, 0, 0, 0, 1, 0, 0, 0, 1};       ///< F0
   };
+
+  void add_neo_hookean(const Part& q, const Eigen::Vector3d& w) {
+    const Eigen::Vector3d along = q.along + q.square * w;
+    const Derivatives d =
+        derivatives(law_, mu_, q.i_c + w.dot(q.along + along), q.j + w.dot(q.of_j));
+    energy_ += q.weight * d.energy;
+    gradient_ += q.weight * (d.a * along + d.d * q.of_j);
+    second_ += q.weight * (d.b * along * along.transpose() + d.c * q.of_j * q.of_j.transpose());
+    second_.diagonal().array() += q.weight * q.square * (d.a + 1e-9 * mu_); // definite if flat
+  }
+
+  void add_modified(const Part& q, const Eigen::Vector3d& w) {
+    SolidBlock f = q.f;
+    for (int i = 0; i < 3; ++i)
+      for (int j = 0; j < 3; ++j)
+        f[static_cast<std::size_t>(3 * i + j)] += w[i] * q.gradient[j];
+    modified_law(law_, mu_, f, cofactors(f), q.j + w.dot(q.of_j), true, modified_);
+    energy_ += q.weight * modified_.energy;
+    gradient_ += q.weight * eigen(product(modified_.stress, q.gradient));
+    for (int i = 0; i < 3; ++i)
+      for (int k = 0; k < 3; ++k) {
+        const auto block = modified_.second.block<3, 3>(3 * i, 3 * k);
+        second_(i, k) += q.weight * eigen(q.gradient).dot(block * eigen(q.gradient));
+      }
+  }
+
+  /// Raises eigenvalues to a thousandth of the stiffness that mu gives.
+  void make_positive() {
+    double least = 0;
+    for (const Part& q : parts_)
+      least += 1e-3 * mu_ * q.weight * q.square;
+    const Eigen::SelfAdjointEigenSolver<Matrix3> solver(second_);
+    if (!(solver.eigenvalues()[0] >= least))
+      second_ = solver.eigenvectors() * solver.eigenvalues().cwiseMax(least).asDiagonal() *
+                solver.eigenvectors().transpose();
+  }
+
   double mu_, constant_ = 0, energy_ = 0;
+  HyperelasticLaw law_;
+  bool neo_hookean_;
+  LawResponse modified_;
   std::array<Part, 24> parts_;
   Eigen::Vector3d linear_ = Eigen::Vector3d::Zero(), gradient_;
   Matrix3 square_ = Matrix3::Zero(), second_;
@@ -361,7 +418,7 @@ Vec3 settled_bubble(const SolidElement& element, std::span<const Vec3> u, const 
   BubbleEnergy bubble(element, u);
   Eigen::Vector3d w = eigen(start);
   double energy = bubble.evaluate(w);
-  for (int round = 0; round < 60; ++round) {
+  for (int round = 0; round < 60 && std::isfinite(energy); ++round) {
     const Eigen::Vector3d by = -bubble.second().ldlt().solve(bubble.gradient());
     const double slope = -by.dot(bubble.gradient()),
                  unsure = 1e-14 * (std::abs(energy) + element.material.mu * element.volume);

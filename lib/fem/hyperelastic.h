@@ -1,22 +1,41 @@
 #pragma once
 // Tetrahedra under large displacements: energy, forces and tangent of one element of an isotropic
-// hyperelastic material. With F = I + du/dx, I_C = tr FᵀF and J = det F the energy per volume at
-// rest is W(F) + lambda/2 (J - 1)², with Lamé's constants of the small strain and
+// hyperelastic material. With F = I + du/dx, C = FᵀF and J = det F the energy per volume at rest is
+// W(F) + lambda/2 (J - 1)², with Lamé's constants of the small strain, mu and
+// lambda = K - 2/3 mu. With I_1 = tr C, I_2 = (I_1² - tr C²)/2 and c_i = lambda_i² the eigenvalues
+// of C, W is
 //
-// - stable Neo-Hookean (Smith, de Goes, Kim, Stable Neo-Hookean flesh simulation, ACM TOG 37(2),
+// - stable_neo_hookean (Smith, de Goes, Kim, Stable Neo-Hookean flesh simulation, ACM TOG 37(2),
 //   2018, eq. 14, with mu there 4/3 mu and lambda there lambda + 5/6 mu, as they say, so that small
 //   strains have the constants given here):
-//   W = 2/3 mu (I_C - 3) - 2/3 mu log((I_C + 1)/4) - mu (J - 1) + 5/12 mu (J - 1)²;
+//   2/3 mu (I_1 - 3) - 2/3 mu log((I_1 + 1)/4) - mu (J - 1) + 5/12 mu (J - 1)²;
 //   finite and smooth for every F, flat and inverted ones too;
-// - Neo-Hookean, the classical one: W = mu/2 (I_C - 3) - mu log J; infinite unless J > 0.
+// - neo_hookean, the classical one: mu/2 (I_1 - 3) - mu log J; infinite unless J > 0;
+// - mooney_rivlin (Mooney, J. Appl. Phys. 11, 1940; Rivlin, Phil. Trans. A 241, 1948):
+//   C10 (I_1' - 3) + C01 (I_2' - 3) + mu/3 (J - 1)², mu = 2 (C10 + C01);
+// - yeoh (Yeoh, Rubber Chem. Technol. 66(5), 1993):
+//   C10 (I_1' - 3) + C20 (I_1' - 3)² + C30 (I_1' - 3)³ + mu/3 (J - 1)², mu = 2 C10;
+// - ogden (Ogden, Proc. R. Soc. A 326, 1972) of one or two terms:
+//   Σ_p 2 mu_p/alpha_p² (Σ_i lambda_i'^alpha_p - 3) + mu/3 (J - 1)², mu = mu_1 + mu_2;
+//
+// with I_1' = J^(-2/3) I_1, I_2' = J^(-4/3) I_2 and lambda_i' = J^(-1/3) lambda_i (Flory, Trans.
+// Faraday Soc. 57, 1961). So the last three are an isochoric law and K/2 (J - 1)². Ogden's own
+// mu_p is 2/alpha_p times the one here. The parameters of a law are relative to mu
+// (model/hyperelastic_law.h).
+//
+// The last three are extended to flat and inverted elements, twice differentiable, so that each F
+// has an energy: powers of J go on below J = 0.1 as their Taylor polynomials of degree 2. Powers of
+// c_i in Ogden's law (of c_j c_k where alpha is negative: that sum is the same where J = 1) go on
+// below 1e-4, a stretch of 0.01, as cubics. Where I_1 < 0.64, which no F with J >= 0.1 has, there
+// is 20 mu (1 - I_1/0.64)³ besides, so that elements don't collapse into a point.
 //
 // Elements are those of fem/element.h: linear, and quadratic with the bubble and J projected on
 // linear functions, which is what the mixed form with a linear, discontinuous pressure
 // p = lambda (projected J - 1) comes to. So nothing locks as nu goes to 1/2, at any displacement,
 // and at rest the tangent is that of fem/element.h, its bubble eliminated: to rounding, for
-// linear and quadratic elements, both laws. W, its small parts in J too, isn't projected. The
-// bubble's amplitude is an unknown of the element (it can't be eliminated in closed form), the
-// eleventh node here.
+// linear and quadratic elements, all laws. W, its parts in J too, isn't projected. The bubble's
+// amplitude is an unknown of the element (it can't be eliminated in closed form), the eleventh node
+// here.
 //
 // Quadratic elements are integrated by 24 points that are exact to degree 6 (Keast, Moderate-degree
 // tetrahedral quadrature formulas, 1986), as the bubble's stiffness at rest asks.
@@ -31,8 +50,6 @@
 #include <span>
 
 namespace gewebe {
-
-enum class HyperelasticLaw { stable_neo_hookean, neo_hookean };
 
 /// Of one element under given displacements.
 struct HyperelasticResponse {
@@ -55,17 +72,18 @@ enum class HyperelasticPart {
   positive_tangent
 };
 
-/// Replaces what `response` had of the parts wanted. A classical Neo-Hookean element that is flat
-/// or inverted in one of its points has the energy HUGE_VAL, and nothing else of it is set.
+/// Replaces what `response` had of the parts wanted, by the element's law. A classical Neo-Hookean
+/// element that is flat or inverted in one of its points has the energy HUGE_VAL, and nothing else
+/// of it is set; so has an element of any law whose energy is too large for a number.
 /// \pre u.size() is 4 (the bubble isn't used then) or 10
-void hyperelastic_response(const SolidElement& element, HyperelasticLaw law,
-                           std::span<const Vec3> u, const Vec3& bubble, HyperelasticPart part,
-                           HyperelasticResponse& response);
+void hyperelastic_response(const SolidElement& element, std::span<const Vec3> u, const Vec3& bubble,
+                           HyperelasticPart part, HyperelasticResponse& response);
 
-/// The bubble of least energy of a quadratic stable Neo-Hookean element, its nodes displaced by u,
-/// by Newton's method from `start`. J is affine in the bubble and W convex in the rest, so there is
-/// one minimum; what is left of the force on it is of the second order in the energy's rounding.
-/// \pre u.size() is 10, all finite
+/// The bubble of least energy of a quadratic element, its nodes displaced by u, by Newton's method
+/// downhill from `start`, with a positive second derivative. J is affine in the bubble and a stable
+/// Neo-Hookean W is convex in the rest, so that there is one minimum; of other laws it is one that
+/// lies downhill. What is left of the force on it is of the second order in the energy's rounding.
+/// `start` itself where its energy isn't finite. \pre u.size() is 10, all finite
 Vec3 settled_bubble(const SolidElement& element, std::span<const Vec3> u, const Vec3& start);
 
 /// The forces that a force per volume at rest puts on the nodes, and on the bubble as the last.

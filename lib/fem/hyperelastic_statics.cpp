@@ -149,8 +149,8 @@ private:
       HyperelasticResponse response;
       for (std::size_t t = begin; t < end; ++t) {
         const ElementDisplacement u = of_element(mesh_, at, t);
-        hyperelastic_response(elements_[t], options_.law, std::span(u.nodes).first(count), u.bubble,
-                              part, response);
+        hyperelastic_response(elements_[t], std::span(u.nodes).first(count), u.bubble, part,
+                              response);
         Linearised& e = of_element_[t];
         e.magnitude = response.energy == HUGE_VAL ? HUGE_VAL : 0;
         for (std::size_t a = 0; a < count; ++a) {
@@ -263,14 +263,13 @@ private:
     const double slope = product(unbalanced_, direction);
     if (!(slope > 0))
       return false;
-    const double energy = hyperelastic_energy(mesh_, elements_, options_.law, at, context_),
+    const double energy = hyperelastic_energy(mesh_, elements_, at, context_),
                  work = product(load, at),
                  unsure = rounding_ + 1e-12 * (std::abs(energy) + std::abs(work));
     for (double s = 1; s > 1e-4; s /= 2) {
       SolidVector there = moved(at, direction, s);
       const double potential =
-          hyperelastic_energy(mesh_, elements_, options_.law, there, context_) -
-          product(load, there);
+          hyperelastic_energy(mesh_, elements_, there, context_) - product(load, there);
       if ((whole && std::isfinite(potential)) ||
           potential <= energy - work - 1e-4 * s * slope + unsure) {
         at = std::move(there);
@@ -318,14 +317,13 @@ SolidVector hyperelastic_weight(const TetMesh& mesh, std::span<const SolidMateri
 }
 
 double hyperelastic_energy(const TetMesh& mesh, std::span<const SolidElement> elements,
-                           HyperelasticLaw law, const SolidVector& displacement,
-                           const Context& context) {
+                           const SolidVector& displacement, const Context& context) {
   std::vector<double> energy(elements.size());
   parallel_blocks(context, elements.size(), grain, [&](std::size_t begin, std::size_t end) {
     HyperelasticResponse response;
     for (std::size_t t = begin; t < end; ++t) {
       const ElementDisplacement u = of_element(mesh, displacement, t);
-      hyperelastic_response(elements[t], law, std::span(u.nodes).first(solid_nodes(mesh)), u.bubble,
+      hyperelastic_response(elements[t], std::span(u.nodes).first(solid_nodes(mesh)), u.bubble,
                             HyperelasticPart::energy, response);
       energy[t] = response.energy;
     }
@@ -337,15 +335,14 @@ double hyperelastic_energy(const TetMesh& mesh, std::span<const SolidElement> el
 }
 
 SolidVector hyperelastic_forces(const TetMesh& mesh, std::span<const SolidElement> elements,
-                                HyperelasticLaw law, const SolidVector& displacement,
-                                const Context& context) {
+                                const SolidVector& displacement, const Context& context) {
   const std::size_t count = solid_nodes(mesh);
   std::vector<std::array<Vec3, HyperelasticResponse::nodes>> forces(elements.size());
   parallel_blocks(context, elements.size(), grain, [&](std::size_t begin, std::size_t end) {
     HyperelasticResponse response;
     for (std::size_t t = begin; t < end; ++t) {
       const ElementDisplacement u = of_element(mesh, displacement, t);
-      hyperelastic_response(elements[t], law, std::span(u.nodes).first(count), u.bubble,
+      hyperelastic_response(elements[t], std::span(u.nodes).first(count), u.bubble,
                             HyperelasticPart::force, response);
       forces[t] = response.force;
     }

@@ -32,17 +32,14 @@ SolidVector hyperelastic_weight(const TetMesh& mesh, std::span<const SolidMateri
 
 /// The energy under displacements, g mm²/s². The same bits on any number of threads.
 double hyperelastic_energy(const TetMesh& mesh, std::span<const SolidElement> elements,
-                           HyperelasticLaw law, const SolidVector& displacement,
-                           const Context& context = {});
+                           const SolidVector& displacement, const Context& context = {});
 
 /// -dE/du, on fixed axes too. \pre as hyperelastic_response: a classical Neo-Hookean solid is
 /// nowhere inverted
 SolidVector hyperelastic_forces(const TetMesh& mesh, std::span<const SolidElement> elements,
-                                HyperelasticLaw law, const SolidVector& displacement,
-                                const Context& context = {});
+                                const SolidVector& displacement, const Context& context = {});
 
 struct HyperelasticOptions {
-  HyperelasticLaw law = HyperelasticLaw::stable_neo_hookean;
   /// The norm of unbalanced forces over that of all forces of elements on nodes and the load's, or
   /// what rounding leaves if that is more, as under loads so small that F is nearly I.
   double tolerance = 1e-10;

@@ -118,7 +118,8 @@ std::vector<SolidMaterial> element_materials(const Model& model) {
     const Material& of = model.materials[m];
     if (used[m] != 0 && !of.poisson)
       throw Error("the material '" + of.name + "' has no Poisson's ratio, expected one");
-    materials[m] = {of.young, of.poisson.value_or(0), of.density};
+    materials[m] = {of.young, of.poisson.value_or(0), of.density,
+                    of.law.value_or(HyperelasticLaw{})};
   }
   return materials;
 }

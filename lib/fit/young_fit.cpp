@@ -143,8 +143,8 @@ public:
       ++fit_.solves;
       std::vector<SolidVector> changes;
       for (const std::size_t m : wanted_)
-        changes.push_back(hyperelastic_forces(mesh_, only(elements, m), options.law,
-                                              fit_.displacement[c], context_));
+        changes.push_back(
+            hyperelastic_forces(mesh_, only(elements, m), fit_.displacement[c], context_));
       const auto moves = hyperelastic_response_to(mesh_, elements, fixed_, fit_.displacement[c],
                                                   changes, options, context_);
       for (std::size_t k = 0; k < data_.size(); ++k) {

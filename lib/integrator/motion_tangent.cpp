@@ -67,8 +67,7 @@ std::vector<Numbers> hyperelastic_tangents(const MotionBody& body, const SolidEn
     HyperelasticResponse response;
     for (std::size_t t = begin; t < end; ++t) {
       const std::array<Vec3, 10> u = energy.displacements(at, t);
-      hyperelastic_response(body.elements[t], HyperelasticLaw::stable_neo_hookean,
-                            std::span(u).first(count), energy.bubble(t),
+      hyperelastic_response(body.elements[t], std::span(u).first(count), energy.bubble(t),
                             HyperelasticPart::positive_tangent, response);
       const Eigen::Map<const Eigen::Matrix<double, 33, 33, Eigen::RowMajor>> k(
           response.tangent.data());

@@ -55,8 +55,8 @@ double SolidEnergy::hyperelastic(const Numbers& at, std::span<double> forces,
       Vec3 bubble;
       if (count == 10)
         bubble = new_bubbles_[t] = settled_bubble(body_.elements[t], u, bubbles_[t]);
-      hyperelastic_response(body_.elements[t], HyperelasticLaw::stable_neo_hookean,
-                            std::span(u).first(count), bubble, HyperelasticPart::force, response);
+      hyperelastic_response(body_.elements[t], std::span(u).first(count), bubble,
+                            HyperelasticPart::force, response);
       energy[t] = response.energy;
       for (std::size_t a = 0; a < count; ++a)
         part[t][a] = response.force[a];

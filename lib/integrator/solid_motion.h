@@ -57,6 +57,8 @@
 
 namespace gewebe {
 
+/// Small strains in frames that rotate; or the hyperelastic law of each material, stable
+/// Neo-Hookean unless it is said otherwise, never the classical one.
 enum class SolidLaw { corotational, stable_neo_hookean };
 
 struct SolidMotionOptions {

@@ -58,8 +58,10 @@ public:
     if (model_.materials.empty())
       throw Error("no material, expected at least one");
     model_.name = model_.materials[0].name;
-    for (Material& material : model_.materials)
-      material.poisson.reset(); // springs know none
+    for (Material& material : model_.materials) { // springs have none
+      material.poisson.reset();
+      material.law.reset();
+    }
     areas_and_materials();
     surface_nodes();
     edge_springs();

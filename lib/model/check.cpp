@@ -58,6 +58,10 @@ void ModelChecker::material(std::size_t i) const {
   require_not_negative(m.damping_ratio, "damping ratio");
   if (m.poisson && !(*m.poisson >= 0 && *m.poisson < 0.5))
     throw Error("Poisson's ratio is " + number_text(*m.poisson) + ", expected 0 to below 0.5");
+  if (m.law && !m.poisson)
+    throw Error("a law without a Poisson's ratio, expected both");
+  if (m.law)
+    check_law(*m.law);
 }
 
 void ModelChecker::begin_nodes(std::size_t count) {

@@ -32,6 +32,8 @@ void override_materials(std::vector<Material>& materials, const MaterialOverride
     m.damping_ratio = values.damping_ratio.value_or(m.damping_ratio);
     if (values.poisson)
       m.poisson = values.poisson;
+    if (values.law)
+      m.law = values.law;
   }
 }
 

@@ -44,6 +44,7 @@ void require_parts(const MaterialChoice& choice, std::span<const std::int32_t> p
 /// What replaces the values of materials.
 struct MaterialOverrides {
   std::optional<double> density, young, thickness, damping_ratio, poisson;
+  std::optional<HyperelasticLaw> law = {};
 };
 void override_materials(std::vector<Material>& materials, const MaterialOverrides& values);
 

@@ -66,7 +66,8 @@ tumour       0.00106  42000  10  0.2  0.49
 silicone     0.00107 264000   5  0.05  0.49
 )";
 
-constexpr const char* form = ", expected name density young thickness damping_ratio [poisson]";
+constexpr const char* form =
+    ", expected name density young thickness damping_ratio [poisson [law]]";
 
 /// Calls visit(number, line with its end, words) for each line that is not blank or a comment
 /// alone.
@@ -99,7 +100,7 @@ bool bad_in_name(char c) {
 }
 
 Material material_of(const std::vector<std::string_view>& words) {
-  if (words.size() != 5 && words.size() != 6)
+  if (words.size() < 5 || words.size() > 7)
     throw Error(std::to_string(words.size()) + (words.size() == 1 ? " word" : " words") + form);
   Material m;
   m.name = words[0];
@@ -124,7 +125,7 @@ Material material_of(const std::vector<std::string_view>& words) {
       throw Error(quoted(word) + " is no " + name + ", expected a finite number " +
                   (zero ? "of 0 or more" : "above 0"));
   }
-  if (words.size() == 6) {
+  if (words.size() >= 6) {
     const std::string_view word = words[5];
     double value = 0;
     const auto [rest, status] = std::from_chars(word.data(), word.data() + word.size(), value);
@@ -132,6 +133,8 @@ Material material_of(const std::vector<std::string_view>& words) {
       throw Error(quoted(word) + " is no Poisson's ratio, expected 0 to below 0.5");
     m.poisson = value;
   }
+  if (words.size() == 7)
+    m.law = parse_law(words[6]);
   return m;
 }
 

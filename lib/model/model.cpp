@@ -314,6 +314,11 @@ std::string model_digest(const Model& model) {
     digest.add(model.tetrahedron_material);
     for (const Material& m : model.materials)
       add_values(m.poisson.value_or(-1));
+    for (const Material& m : model.materials)
+      if (m.law) { // else the digest stays what it was
+        add_values(m.law->kind);
+        digest.add_bytes(m.law->parameter.data(), sizeof m.law->parameter);
+      }
   }
   if (const Skin& skin = model.skin; !skin.points.empty()) {
     add_count(skin.points.size());

@@ -9,6 +9,7 @@
 //   - there is a material and a node;
 //   - every number is finite; names contain no `"`, `#` or control character;
 //   - density, thickness > 0; young, damping ratio, mass, drag, stiffness, damping, rest >= 0;
+//   - a material with a law has a Poisson's ratio, and check_law(law) passes;
 //   - a node's material exists;
 //   - a node's central is -1 or the index of a later node; the nodes named so are consecutive, and
 //     their own central is -1;
@@ -26,6 +27,7 @@
 
 #include "geometry/mesh.h"
 #include "geometry/vec3.h"
+#include "model/hyperelastic_law.h"
 
 #include <array>
 #include <cstddef>
@@ -44,6 +46,9 @@ struct Material {
   double thickness = 1;          ///< of the wall that the surface stands for, mm
   double damping_ratio = 0.2;    ///< of a spring with its two masses; 1 is critical
   std::optional<double> poisson; ///< Poisson's ratio, 0 to below 1/2; springs do not use it
+  /// Of large strains; springs and small strains do not use it. None: the law is left to the user
+  /// of the model, see fem/solid_model.h.
+  std::optional<HyperelasticLaw> law;
 
   bool operator==(const Material&) const = default;
 };

@@ -22,6 +22,7 @@ Model rich_model() {
   options.bend = options.normals = true;
   Model model = build_model(mesh, options, Context{}).model;
   model.materials[0].poisson = 0.25;
+  model.materials[0].law = parse_law("ogden:alpha1=4,alpha2=-3,mu2=0.3");
   model.tetrahedra = {{0, 2, 5, 4}, {0, 3, 4, 5}};
   model.tetrahedron_material = {0, 0};
   model.name = "two balls, Größe 1";
@@ -178,7 +179,9 @@ TEST(Ela, EachFaultHasItsLine) {
       {"end\n", "tetrahedra 1\n0 1 2 0 0\nend\n", "18: corner 0 stands twice"},
       {"end\n", "tetrahedra 1\n0 1 2\nend\n", "18: "},
       {"1 0.2\n", "1 0.2 0.5\n", "4: Poisson's ratio is 0.5, expected 0 to below 0.5"},
-      {"1 0.2\n", "1 0.2 0.4 1\n", "4: surplus word '1', expected 7 words"},
+      {"1 0.2\n", "1 0.2 0.4 1\n", "4: '1' is no law, expected neo-hookean"},
+      {"1 0.2\n", "1 0.2 0.4 yeoh:c20=2e3\n", "4: c20 of 2000 is out of range, expected -1000"},
+      {"1 0.2\n", "1 0.2 0.4 yeoh 1\n", "4: surplus word '1', expected 8 words"},
       {"0 1 e 10", "0 4 e 10", "11: node 4 does not exist, expected 0 to 3"},
       {"0 1 e 10", "-1 1 e 10", "11: '-1' is no node"},
       {"0 1 e 10", "1 0 e 10", "11: spring 1 0, expected the smaller node first"},

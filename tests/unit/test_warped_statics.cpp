@@ -85,9 +85,7 @@ struct Reference {
         f.axes[axis_of(node, a)] += force[a];
     const auto found = hyperelastic_statics(mesh, elements, fixed, prescribed, f);
     u = found.displacement.axes;
-    forces =
-        hyperelastic_forces(mesh, elements, HyperelasticLaw::stable_neo_hookean, found.displacement)
-            .axes;
+    forces = hyperelastic_forces(mesh, elements, found.displacement).axes;
     for (std::size_t k = 0; k < forces.size(); ++k)
       forces[k] = -forces[k] - f.axes[k];
   }

@@ -18,7 +18,8 @@ using namespace gewebe;
 namespace {
 
 /// A bar of 80 x 20 x 20 along x, held at x = 0; its second half is of another material.
-test::Solid bar(double first, double second, std::uint32_t across = 2) {
+test::Solid bar(double first, double second, std::uint32_t across = 2,
+                const HyperelasticLaw& law = {}) {
   TetMesh mesh = test::box_tetrahedra(4 * across, across, across, 20.0 / across);
   mesh.material.clear();
   for (const Tetrahedron& t : mesh.tetrahedra) {
@@ -27,7 +28,7 @@ test::Solid bar(double first, double second, std::uint32_t across = 2) {
       x += mesh.points[c].x / 4;
     mesh.material.push_back(x > 40 ? 1 : 0);
   }
-  test::Solid solid(mesh, true, {{first, 0.45, 1e-3}, {second, 0.45, 1e-3}});
+  test::Solid solid(mesh, true, {{first, 0.45, 1e-3, law}, {second, 0.45, 1e-3, law}});
   for (std::size_t axis = 0; axis < 3; ++axis)
     solid.hold(axis, [](const Vec3& p) { return p.x == 0; });
   return solid;
@@ -116,6 +117,19 @@ TEST(YoungFit, FindsWhatMadeTheDisplacements) {
   EXPECT_LE(fit.solves, 10);
   EXPECT_LT(fit.residual, 1e-4 * fit.measured);
   EXPECT_TRUE(fit.outliers.empty());
+}
+
+TEST(YoungFit, FindsModuliUnderTheLawsOfMaterials) {
+  for (const HyperelasticLaw& law : {HyperelasticLaw{HyperelasticLaw::yeoh, {0.5, 0.1}},
+                                     HyperelasticLaw{HyperelasticLaw::ogden, {6}}}) {
+    const MeasuredCase c = measured(bar(8000, 20000, 1, law), 9810, 0);
+    const test::Solid start = bar(50000, 10000, 1, law);
+    const YoungFit fit = fit_young(start.mesh, start.materials, names, both, start.fixed,
+                                   std::span(&c, 1), {.tolerance = 1e-6});
+    EXPECT_NEAR(fit.materials[0].young, 8000, 8e-4 * 8000);
+    EXPECT_NEAR(fit.materials[1].young, 20000, 8e-4 * 20000);
+    EXPECT_LT(fit.residual, 1e-4 * fit.measured);
+  }
 }
 
 TEST(YoungFit, OfOneMaterialTakesTheOtherAsKnown) {

@@ -76,6 +76,9 @@ void declare(cli::Program& p, ModelArguments& a) {
   p.option("--poisson", a.values.poisson, "NU",
            "Poisson's ratio of tetrahedra, instead of the material's")
       .range(0, 0.4999999);
+  p.option("--law", a.law, "LAW",
+           "law of large strains of tetrahedra, instead of the material's, such as yeoh:c20=0.1")
+      .such_as({"neo-hookean", "classical-neo-hookean", "mooney-rivlin:", "yeoh:", "ogden:"});
   p.option("--order", a.order, "N", "elements: 1 linear, 2 quadratic").range(1, 2);
   p.option("--thickness", a.values.thickness, "H",
            "thickness of a net in mm, instead of the material's")
@@ -125,6 +128,8 @@ void complete(ModelArguments& a) {
     a.matrix = parsed("--primitive", [&] { return parse_primitive(a.primitive, a.size); });
   }
   parsed("--name", [&] { check_name(a.name); });
+  if (!a.law.empty())
+    a.values.law = parsed("--law", [&] { return parse_law(a.law); });
   refuse(a.list_materials && (a.mesh != "-" || a.matrix || a.fix != "none" || !a.fit.empty()),
          "--list-materials makes no model, expected no mesh and no nodes");
   if (a.materials.empty())

@@ -17,7 +17,7 @@ namespace gewebe {
 struct ModelArguments {
   std::string mesh = "-", unit, weld = "auto", material = "generic", name, fix = "none",
               axes = "xyz", primitive, size, repair, materials, fit, rule = "parity",
-              on_open = "error", space, transform;
+              on_open = "error", space, transform, law;
   MaterialOverrides values;
   BuildOptions build;
   RepairOptions repairs;

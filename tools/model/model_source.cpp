@@ -6,12 +6,14 @@
 #include "formats/tetrahedra/tet_file.h"
 #include "model/build.h"
 #include "model/figures.h"
+#include "model/law_stability.h"
 #include "tools/cli/mesh_size.h"
 #include "tools/cli/transform_option.h"
 #include "tools/model/net_source.h"
 #include "tools/model/solid_source.h"
 
 #include <optional>
+#include <string>
 #include <utility>
 
 namespace gewebe::cli {
@@ -29,7 +31,10 @@ Model model_source(Run& run, ModelArguments a, Space& space) {
   const std::optional<Affine> map =
       a.transform.empty() ? std::nullopt : std::optional(transform_from_text(a.transform));
   space = space_from_name(a.space);
+  constexpr const char* for_solids =
+      "the input is a surface, expected --solid beside --poisson, --law and --order";
   if (a.matrix) {
+    refuse(!a.solid && a.values.law, for_solids);
     number_parts(a.build.material, {});
     require_parts(a.build.material, {});
     const double nodes = static_cast<double>(a.matrix->m) * a.matrix->n;
@@ -67,8 +72,7 @@ Model model_source(Run& run, ModelArguments a, Space& space) {
     at(input.name(), [&] { number_parts(a.build.material, {}); });
     return solid_source(run, input, from, a);
   }
-  refuse(!a.solid && (a.values.poisson || a.order != 2),
-         "the input is a surface, expected --solid beside --poisson and --order");
+  refuse(!a.solid && (a.values.poisson || a.values.law || a.order != 2), for_solids);
   const MeshReadOptions options{.kind = from,
                                 .unit = a.unit,
                                 .weld = weld_from_name(a.weld),
@@ -84,6 +88,13 @@ Model model_source(Run& run, ModelArguments a, Space& space) {
   if (a.unit.empty())
     warn_of_size(run, input.name(), mesh, {});
   return model_of_surface(run, input.name(), std::move(mesh), a);
+}
+
+void warn_of_laws(Run& run, const Model& model) {
+  for (const Material& m : model.materials)
+    if (const std::string paths = m.law ? instability_text(*m.law) : ""; !paths.empty())
+      run.warn(model.name + ": material '" + m.name + "': " + law_text(*m.law) +
+               " is unstable in " + paths + ", expected smaller strains or other parameters");
 }
 
 } // namespace gewebe::cli

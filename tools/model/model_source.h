@@ -13,4 +13,7 @@ namespace gewebe::cli {
 /// \throw UsageError if an option says nothing of such an input; Error as the readers
 Model model_source(Run& run, ModelArguments a, Space& space);
 
+/// Warns of materials whose law becomes unstable under strains, naming the smallest of them.
+void warn_of_laws(Run& run, const Model& model);
+
 } // namespace gewebe::cli
