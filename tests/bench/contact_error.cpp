@@ -16,7 +16,8 @@
 //
 // Writes CSV to standard output: stage, program, nodes, contacts, threads, median_ms, error, its
 // measure, the setting over its default
-// (of MuJoCo: s for a part of the way), and the error against theory (empty: there is none).
+// (of MuJoCo: step, stiffness of contact, seconds for a part of the way), and the error against
+// theory (empty: there is none).
 
 #include "contact/instrument.h"
 #include "fem/solid_model.h"
@@ -169,9 +170,10 @@ void set_stick(contact::Parameters& p, double factor) {
 }
 
 void row(const Scene& scene, const std::string& program, std::size_t contacts, double milliseconds,
-         double error, double factor, const std::string& theory) {
-  std::printf("%s,%s,%zu,%zu,1,%.4f,%.3e,of the force,%g,%s\n", scene.name.c_str(), program.c_str(),
-              scene.model.nodes.size(), contacts, milliseconds, error, factor, theory.c_str());
+         double error, const std::string& setting, const std::string& theory) {
+  std::printf("%s,%s,%zu,%zu,1,%.4f,%.3e,of the force,%s,%s\n", scene.name.c_str(), program.c_str(),
+              scene.model.nodes.size(), contacts, milliseconds, error, setting.c_str(),
+              theory.c_str());
   (void)std::fflush(stdout);
 }
 
@@ -199,12 +201,13 @@ void bench(const Scene& scene, double theory) {
         found = answer(scene, solver, parameters);
         times.push_back(found.milliseconds);
       }
-      std::array<char, 32> text{};
+      std::array<char, 32> setting{}, text{};
+      (void)std::snprintf(setting.data(), setting.size(), "%g", factor);
       if (theory > 0)
         (void)std::snprintf(text.data(), text.size(), "%.3e",
                             std::abs(4 * found.forces.back().z / theory - 1));
       row(scene, "Gewebe; " + name, found.contacts, times_of(times).median,
-          error_of(scene, found.forces, known.forces), factor, text.data());
+          error_of(scene, found.forces, known.forces), setting.data(), text.data());
     }
 }
 
@@ -268,12 +271,12 @@ void bench_peer(const Scene& scene) {
     for (const Peer& peer : {Peer{0.01, 1e4, 0.06}, Peer{0.01, 1e5, 0.06}, Peer{0.01, 1e6, 0.06},
                              Peer{0.01, 1e7, 0.1}, Peer{0.005, 1e6, 0.06}}) {
       const Answer found = peer_answer(scene, file, peer);
-      std::array<char, 96> name{};
-      (void)std::snprintf(name.data(), name.size(), "MuJoCo flex; step %g s, stiffness %g/s2",
-                          peer.step, peer.stiffness);
+      std::array<char, 96> setting{};
+      (void)std::snprintf(setting.data(), setting.size(), "%g s; %g/s2; %g s", peer.step,
+                          peer.stiffness, peer.seconds);
       if (!found.forces.empty())
-        row(scene, name.data(), 0, found.milliseconds, error_of(scene, found.forces, known.forces),
-            peer.seconds, "");
+        row(scene, "MuJoCo flex", 0, found.milliseconds,
+            error_of(scene, found.forces, known.forces), setting.data(), "");
     }
   std::filesystem::remove_all(folder);
 }
@@ -281,7 +284,7 @@ void bench_peer(const Scene& scene) {
 } // namespace
 
 int main(int argc, char** argv) {
-  std::puts("stage,program,nodes,contacts,threads,median_ms,error,measure,factor,theory_error");
+  std::puts("stage,program,nodes,contacts,threads,median_ms,error,measure,setting,theory_error");
   const auto [force, touched] = force_of_theory();
   const std::string only = argc > 1 ? argv[1] : "";
   if (only != "mujoco")
