@@ -253,6 +253,7 @@ $(BUILD)/unit: $(call obj,$(UNIT_SRC)) $(SHARED) $(ARCHIVE) | $(PLUGIN)
 $(STRESS): $(BUILD)/stress_%: $(BUILD)/obj/tests/stress/%.o $(call obj,tests/unit/mesh_fixtures.cpp) $(SHARED) $(ARCHIVE)
 	$(LINK) $(LIBS)
 
+$(BUILD)/bench_contact_error: $(call obj,tests/validate/pressed_body.cpp)
 $(BENCH): $(BUILD)/bench_%: $(BUILD)/obj/tests/bench/%.o $(call obj,tests/unit/mesh_fixtures.cpp) $(SHARED) $(ARCHIVE)
 	$(LINK) $(LIBS) $(BENCH_LIBS)
 
@@ -320,7 +321,7 @@ endif
 # PAGE=NAME makes that page alone, QUICK=1 small ones without benchmarks; BEFORE=FOLDER has another commit's programs,
 # which one page compares with these.
 REPORT ?= $(BUILD)/report
-REPORT_BENCH := antialias break_even csg density ela factor geometry latency render solid_motion_peers stiffness stuffing_cgal \
+REPORT_BENCH := antialias break_even contact_error csg density ela factor geometry latency render solid_motion_peers stiffness stuffing_cgal \
   surface_quality_cgal voxelize work_error
 report: $(TOOLS) $(PLUGIN) $(if $(QUICK),,$(REPORT_BENCH:%=$(BUILD)/bench_%) $(VALIDATE)) | $(FIRST)
 	@python3 tests/report/report.py '$(REPORT)' --build '$(BUILD)' $(if $(PAGE),--page '$(PAGE)') $(if $(QUICK),--quick)

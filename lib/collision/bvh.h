@@ -31,6 +31,14 @@ public:
   /// Box around everything.
   const Box3& box() const { return nodes_.empty() ? nothing_ : nodes_[0].box; }
 
+  /// Calls visit(items) for each leaf: groups of neighbours, which hold each item once.
+  template <class Visit>
+  void for_each_leaf(Visit&& visit) const {
+    for (const Node& node : nodes_)
+      if (node.second == 0)
+        visit(std::span(order_).subspan(node.begin, node.end - node.begin));
+  }
+
   /// Calls visit(item) for all items whose box has a point in common with this one.
   template <class Visit>
   void for_each_overlapping(const Box3& box, Visit&& visit) const {

@@ -15,6 +15,13 @@ namespace gewebe::collision {
 
 namespace {
 
+/// Lists of fewer primitives have no groups; primitives of a group.
+constexpr std::size_t many = 1024, group_size = 64;
+/// The whole tree serves where more than this part of a list is near.
+constexpr double few = 0.25;
+/// Lists of fewer are compared with all of another one.
+constexpr std::size_t very_few = 8;
+
 template <std::size_t n>
 std::array<Vec3, n> positions(std::span<const Vec3> x, const std::array<std::uint32_t, n>& vertex) {
   std::array<Vec3, n> y;
@@ -60,7 +67,7 @@ void BroadPhase::set_boxes(const BoxOf& box_of) {
     }
     for (Primitives* primitives :
          {&owner.points, &owner.edges, &owner.triangles, &owner.lone_points, &owner.lone_edges})
-      primitives->current = false;
+      primitives->current = primitives->grouped_now = false;
   }
 }
 
@@ -87,6 +94,87 @@ void BroadPhase::find_pairs(const Primitives& a, const Primitives& b) {
     a.tree.for_each_own_pair(add);
   else
     a.tree.for_each_pair(b.tree, add);
+  std::sort(pairs_.begin(), pairs_.end());
+}
+
+template <class VerticesOf>
+void BroadPhase::make_groups(std::span<const Vec3> x, Primitives& primitives,
+                             const VerticesOf& vertices_of) {
+  std::vector<Box3> boxes(primitives.number.size());
+  for (std::size_t k = 0; k < boxes.size(); ++k)
+    for (const std::uint32_t v : vertices_of(primitives.number[k]))
+      boxes[k].add(x[v]);
+  Bvh(boxes, group_size).for_each_leaf([&](std::span<const std::uint32_t> places) {
+    Group group;
+    group.first = static_cast<std::uint32_t>(primitives.grouped.size());
+    primitives.grouped.insert(primitives.grouped.end(), places.begin(), places.end());
+    group.last = static_cast<std::uint32_t>(primitives.grouped.size());
+    std::vector<std::uint32_t> corners;
+    for (const std::uint32_t place : places)
+      for (const std::uint32_t v : vertices_of(primitives.number[place]))
+        corners.push_back(v);
+    std::sort(corners.begin(), corners.end());
+    corners.erase(std::unique(corners.begin(), corners.end()), corners.end());
+    group.first_corner = static_cast<std::uint32_t>(primitives.corners.size());
+    primitives.corners.insert(primitives.corners.end(), corners.begin(), corners.end());
+    group.last_corner = static_cast<std::uint32_t>(primitives.corners.size());
+    primitives.groups.push_back(group);
+  });
+}
+
+template <class BoxOf, class VerticesOf>
+bool BroadPhase::find_near(Primitives& primitives, const Box3& other, std::span<const Vec3> x,
+                           const BoxOf& box_of, const VerticesOf& vertices_of, Near& near) {
+  near.place.clear();
+  near.boxes.clear();
+  const auto look = [&](std::uint32_t place) {
+    const Box3 box = box_of(vertices_of(primitives.number[place]));
+    if (!meet(box, other))
+      return;
+    near.place.push_back(place);
+    near.boxes.push_back(box);
+  };
+  const std::size_t count = primitives.number.size();
+  if (count < many) {
+    for (std::uint32_t place = 0; place < count; ++place)
+      look(place);
+    return true;
+  }
+  if (primitives.groups.empty())
+    make_groups(x, primitives, vertices_of);
+  if (!primitives.grouped_now)
+    for (Group& group : primitives.groups)
+      group.box = box_of(std::span(primitives.corners)
+                             .subspan(group.first_corner, group.last_corner - group.first_corner));
+  primitives.grouped_now = true;
+  std::size_t close = 0;
+  for (const Group& group : primitives.groups)
+    if (meet(group.box, other))
+      close += group.last - group.first;
+  if (!(static_cast<double>(close) <= few * static_cast<double>(count)))
+    return false;
+  for (const Group& group : primitives.groups)
+    if (meet(group.box, other))
+      for (std::uint32_t k = group.first; k < group.last; ++k)
+        look(primitives.grouped[k]);
+  return true;
+}
+
+void BroadPhase::find_near_pairs(const Primitives& a, const Primitives& b) {
+  pairs_.clear();
+  const auto& [near_a, near_b] = near_;
+  const auto add = [&, &of_a = near_a.place, &of_b = near_b.place](std::size_t i, std::size_t j) {
+    pairs_.push_back({a.number[of_a[i]], b.number[of_b[j]]});
+  };
+  const std::size_t count_a = near_a.place.size(), count_b = near_b.place.size();
+  if (std::min(count_a, count_b) > very_few) {
+    Bvh(near_a.boxes).for_each_pair(Bvh(near_b.boxes), add);
+  } else {
+    for (std::size_t i = 0; i < count_a; ++i)
+      for (std::size_t j = 0; j < count_b; ++j)
+        if (meet(near_a.boxes[i], near_b.boxes[j]))
+          add(i, j);
+  }
   std::sort(pairs_.begin(), pairs_.end());
 }
 
@@ -135,13 +223,20 @@ void BroadPhase::find(const CollisionSurface& surface, std::span<const Vec3> x0,
     gaps_of_list.push_back(gap);
   };
   // Of two owners, or of one and itself.
-  const auto meet_all = [&](Primitives& a, const auto& vertices_a, Primitives& b,
-                            const auto& vertices_b, auto& list, std::vector<double>& gaps_of_list) {
+  const auto meet_all = [&](Primitives& a, const auto& vertices_a, const Owner& of_a, Primitives& b,
+                            const auto& vertices_b, const Owner& of_b, auto& list,
+                            std::vector<double>& gaps_of_list) {
     if (a.number.empty() || b.number.empty())
       return;
-    refit(a, box_of, vertices_a);
-    refit(b, box_of, vertices_b);
-    find_pairs(a, b);
+    if (&of_a != &of_b && std::max(a.number.size(), b.number.size()) >= many &&
+        find_near(a, of_b.box, x0, box_of, vertices_a, near_[0]) &&
+        find_near(b, of_a.box, x0, box_of, vertices_b, near_[1])) {
+      find_near_pairs(a, b);
+    } else {
+      refit(a, box_of, vertices_a);
+      refit(b, box_of, vertices_b);
+      find_pairs(a, b);
+    }
     for (const auto& [i, j] : pairs_)
       add(vertices_a(i), vertices_b(j), list, gaps_of_list);
   };
@@ -151,14 +246,14 @@ void BroadPhase::find(const CollisionSurface& surface, std::span<const Vec3> x0,
       Owner &a = owners_[i], &b = owners_[j];
       if (!allowed.at(i, j) || !meet(a.box, b.box))
         continue;
-      meet_all(a.points, point, b.triangles, triangle, candidates.point_triangle, gaps[3]);
+      meet_all(a.points, point, a, b.triangles, triangle, b, candidates.point_triangle, gaps[3]);
       if (i != j)
-        meet_all(b.points, point, a.triangles, triangle, candidates.point_triangle, gaps[3]);
-      meet_all(a.edges, edge, b.edges, edge, candidates.edge_edge, gaps[2]);
-      meet_all(a.lone_points, point, b.lone_edges, edge, candidates.point_edge, gaps[1]);
+        meet_all(b.points, point, b, a.triangles, triangle, a, candidates.point_triangle, gaps[3]);
+      meet_all(a.edges, edge, a, b.edges, edge, b, candidates.edge_edge, gaps[2]);
+      meet_all(a.lone_points, point, a, b.lone_edges, edge, b, candidates.point_edge, gaps[1]);
       if (i != j)
-        meet_all(b.lone_points, point, a.lone_edges, edge, candidates.point_edge, gaps[1]);
-      meet_all(a.lone_points, point, b.lone_points, point, candidates.point_point, gaps[0]);
+        meet_all(b.lone_points, point, b, a.lone_edges, edge, a, candidates.point_edge, gaps[1]);
+      meet_all(a.lone_points, point, a, b.lone_points, point, b, candidates.point_point, gaps[0]);
     }
   gaps_.clear();
   for (const std::vector<double>& of_list : gaps)

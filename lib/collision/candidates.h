@@ -68,11 +68,25 @@ public:
                                                std::size_t most);
 
 private:
+  /// Neighbouring primitives, by ranges of Primitives::grouped and Primitives::corners.
+  struct Group {
+    std::uint32_t first = 0, last = 0, first_corner = 0, last_corner = 0;
+    Box3 box;
+  };
   struct Primitives {
     std::vector<std::uint32_t> number; ///< ascending
     std::vector<Box3> boxes;
     Bvh tree;
-    bool current = false; ///< the tree belongs to the present x0, x1
+    bool current = false;      ///< the tree belongs to the present x0, x1
+    std::vector<Group> groups; ///< of many primitives
+    std::vector<std::uint32_t> grouped,
+        corners;              ///< places in `number`; vertices, each once a group
+    bool grouped_now = false; ///< the boxes of groups belong to x0, x1
+  };
+  /// Primitives of one list that are near the box of another owner.
+  struct Near {
+    std::vector<std::uint32_t> place; ///< in Primitives::number
+    std::vector<Box3> boxes;
   };
   struct Owner {
     Primitives points, edges, triangles, lone_points, lone_edges;
@@ -83,10 +97,19 @@ private:
   void set_boxes(const BoxOf& box_of);
   template <class BoxOf, class VerticesOf>
   void refit(Primitives& primitives, const BoxOf& box_of, const VerticesOf& vertices_of);
+  template <class VerticesOf>
+  void make_groups(std::span<const Vec3> x, Primitives& primitives, const VerticesOf& vertices_of);
+  /// Finds primitives whose boxes meet `other`, by the boxes of groups alone where they are many.
+  /// \return whether they are few; else the tree serves better
+  template <class BoxOf, class VerticesOf>
+  bool find_near(Primitives& primitives, const Box3& other, std::span<const Vec3> x,
+                 const BoxOf& box_of, const VerticesOf& vertices_of, Near& near);
   /// Numbers of the primitives of both whose boxes meet, ascending.
   void find_pairs(const Primitives& a, const Primitives& b);
+  void find_near_pairs(const Primitives& a, const Primitives& b);
 
   std::vector<Owner> owners_;
+  std::array<Near, 2> near_;                        ///< of the two lists of find_near_pairs
   std::vector<std::array<std::uint32_t, 2>> pairs_; ///< of find_pairs
   std::vector<double> gaps_;
 };

@@ -187,17 +187,17 @@ void StepSolver::Work::require_apart() const {
     throw IntersectsAtStart("contact: surfaces intersect near " + place_text(least.position));
 }
 
-/// The chosen step of the system; trial_ becomes its end.
+/// The chosen step of the system; trial_ becomes its end, for the vertices of the system alone: no
+/// candidate has another.
 StepSolver::Work::Step StepSolver::Work::take_step(const CondensedSystem& system) {
   Step result;
   const std::span<const std::uint32_t> vertices = system.vertices();
-  trial_ = at_;
   for (std::size_t k = 0; k < vertices.size(); ++k) {
     const Vec3& step = system.step(k);
     result.slope += dot(gradient_[vertices[k]], step);
     const double size = norm(step);
     result.length = size <= result.length ? result.length : size;
-    trial_[vertices[k]] += step;
+    trial_[vertices[k]] = at_[vertices[k]] + step;
   }
   if (!std::isfinite(result.length))
     throw NotSolved("contact: Newton's step is not finite");
@@ -277,14 +277,22 @@ bool StepSolver::Work::lower_energy(CondensedSystem& system, double contact) {
   system.require_descent(step.slope);
   const double slope = system.slope() + step.slope, here = system.energy(0) + contact;
   const double unsure = rounding * (std::abs(here) + std::abs(contact));
-  const std::vector<Vec3> target = trial_;
+  const std::span<const std::uint32_t> vertices = system.vertices();
+  std::vector<Vec3> target;
+  for (const std::uint32_t v : vertices)
+    target.push_back(trial_[v]);
+  const auto try_part = [&](double part) {
+    for (std::size_t n = 0; n < vertices.size(); ++n) {
+      const Vec3& at = at_[vertices[n]];
+      trial_[vertices[n]] = part < 1 ? at + part * (target[n] - at) : target[n];
+    }
+  };
   double part = step.free;
   for (int k = 0; k < max_halvings; ++k) {
-    for (const std::uint32_t v : system.vertices())
-      trial_[v] = part < 1 ? at_[v] + part * (target[v] - at_[v]) : target[v];
+    try_part(part);
     if (system.energy(part) + energy_at(trial_) <=
         here + armijo * part * std::min(slope, 0.0) + unsure) {
-      trial_ = target;
+      try_part(1);
       take(system, step, part);
       return true;
     }
@@ -293,7 +301,7 @@ bool StepSolver::Work::lower_energy(CondensedSystem& system, double contact) {
   if (!(step.length <= energy_.step_limit()) || step.free < 1)
     return false;
   // The energy cannot be told from rounding; forces can.
-  trial_ = target;
+  try_part(1);
   take(system, step, 1);
   return true;
 }

@@ -66,7 +66,9 @@ bool SweptCandidates::are_free(std::span<const Vec3> from, std::span<const Vec3>
 }
 
 bool SweptCandidates::covers(std::uint32_t vertex, const Vec3& x, double room) const {
-  return distance_to_segment(x, from_[vertex], way_[vertex]) <= room;
+  const Vec3 gone = x - from_[vertex]; // most go less far than that
+  return dot(gone, gone) <= room * room ||
+         distance_to_segment(x, from_[vertex], way_[vertex]) <= room;
 }
 
 bool SweptCandidates::cover(std::span<const Vec3> x, double room) const {

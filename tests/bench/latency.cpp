@@ -1,9 +1,9 @@
-// Whether ffe-run --serve answers a thousand times a second: a patient's colon (a ball where there
-// is no shared data) of 10,000 nodes by the method ffe, along which several spheres slide, each
-// wholly anew in every step of 1 ms, so that what is touched changes all the time. Forces and
-// instruments are answered through a pipe; who asks does so by the clock, once a millisecond.
+// Whether ffe-run --serve answers a thousand times a second: a ball of 10,246 nodes by the method
+// ffe, along which several spheres slide, each wholly anew in every step of 1 ms, so that what is
+// touched changes all the time. Forces and instruments are answered through a pipe; the client
+// asks by the clock, once a millisecond.
 //
-//   bench_latency [SECONDS] [spheres=N] [depth=EDGES] [awake] [fifo] [store] [to=FOLDER]
+//   bench_latency [SECONDS] [spheres=N] [depth=EDGES] [awake] [fifo] [store] [report] [to=FOLDER]
 //
 // awake: ffe-run waits for lines without sleep (--busy-wait). fifo: both programs have real-time
 // priority, where that is permitted; with awake, where such programs may take all of a processor's
@@ -13,10 +13,11 @@
 // of the processor's time, memory.csv what ffe-run had in memory, by the second, and memory.svg its
 // picture.
 //
-// Ten minutes with some 20 contacts that change, on a machine that does nothing else:
+// report: ten minutes with three spheres and a store, awake, unless other words say otherwise. It
+// prints a table, a histogram and the memory at the start and at the end as text instead of CSV:
 //
-//   build/release/bench_latency 600 spheres=3 store awake to=build/latency
-//   build/release/bench_latency 600 spheres=3 store awake fifo to=build/latency-real-time
+//   build/release/bench_latency report to=build/latency
+//   build/release/bench_latency report fifo to=build/latency-real-time
 //
 // Writes CSV to standard output: stage, program, nodes, contacts (nodes with a force, in the mean),
 // answers, what half, 99 % and 99.9 % of all did not exceed and the largest, a figure and its unit.
@@ -60,16 +61,22 @@ constexpr double tick = 1e-3;         // s
 constexpr double ball = 60;           // mm
 constexpr double speed = 40;          // mm/s
 constexpr double radius_in_edges = 2; // of an instrument
+constexpr std::string_view report_word = "report";
 
 struct Wanted {
   double seconds = 10, depth = 0.5;
   std::size_t spheres = 5;
-  bool awake = false, fifo = false, store = false;
+  bool awake = false, fifo = false, store = false, report = false;
   std::string folder;
 };
 
 Wanted wanted(int argc, char** argv) {
   Wanted w;
+  if (std::any_of(argv + 1, argv + argc, [](const char* word) { return word == report_word; })) {
+    w.seconds = 600;
+    w.spheres = 3;
+    w.report = w.store = w.awake = true;
+  }
   for (int k = 1; k < argc; ++k) {
     const std::string word = argv[k];
     const auto behind = [&](std::string_view name) { return word.substr(name.size()); };
@@ -79,6 +86,8 @@ Wanted wanted(int argc, char** argv) {
       w.depth = std::strtod(behind("depth=").c_str(), nullptr);
     else if (word.starts_with("to="))
       w.folder = std::filesystem::absolute(behind("to=")).string();
+    else if (word == report_word)
+      continue; // above
     else if (word == "awake")
       w.awake = true;
     else if (word == "fifo" || word == "store")
@@ -88,7 +97,8 @@ Wanted wanted(int argc, char** argv) {
   }
   if (!(w.seconds > 0) || w.spheres == 0 || !(w.depth > 0))
     Served::fail(
-        "latency: expected [SECONDS] [spheres=N] [depth=EDGES] [awake] [fifo] [store] [to=FOLDER]");
+        "latency: expected [SECONDS] [spheres=N] [depth=EDGES] [awake] [fifo] [store] [report] "
+        "[to=FOLDER]");
   return w;
 }
 
@@ -154,6 +164,7 @@ double load_average() {
 struct Run {
   std::vector<double> latency, work; // ms
   double contacts = 0;
+  double memory_first = 0;                       // MB, before the first step
   double memory_before = 0, memory_after = 0;    // MB, behind the first tenth and in the end
   std::size_t late = 0;                          // answers beyond their tick
   Served::Disturbed disturbed;                   // while it answered
@@ -185,6 +196,7 @@ Run drive(const Served& served, const Wanted& w, double edge) {
   run.work.reserve(count);
   const double begin = now() + tick;
   double worked = served.worked();
+  run.memory_first = served.resident();
   const Served::Disturbed before = served.disturbed();
   for (std::size_t step = 1; step <= count; ++step) {
     const double time = static_cast<double>(step) * tick, due = begin + time;
@@ -235,6 +247,57 @@ void keep(const std::string& folder, const std::string& name, const std::vector<
   draw(picture, bins, title, marks);
 }
 
+std::vector<double> sorted(std::vector<double> times) {
+  std::ranges::sort(times);
+  return times;
+}
+
+void print_csv(const Run& run, const std::string& program, std::size_t nodes) {
+  std::puts("stage,program,nodes,contacts,answers,p50_ms,p99_ms,p999_ms,largest_ms,figure,unit");
+  for (const bool latency : {true, false}) {
+    const std::vector<double> times = sorted(latency ? run.latency : run.work);
+    std::printf("%s,%s,%zu,%.1f,%zu,%.4f,%.4f,%.4f,%.4f,%.4g,%s\n", latency ? "latency" : "work",
+                program.c_str(), nodes, run.contacts, times.size(), quantile(times, 0.5),
+                quantile(times, 0.99), quantile(times, 0.999), times.back(),
+                latency ? static_cast<double>(run.late) : run.memory_after - run.memory_before,
+                latency ? "answers too late" : "MB that memory grew in the last nine tenths");
+  }
+  for (const bool faults : {true, false})
+    std::printf("%s,%s,%zu,%.1f,%zu,,,,,%.4g,%s\n", faults ? "faults" : "switches", program.c_str(),
+                nodes, run.contacts, run.latency.size(),
+                faults ? run.disturbed.faults : run.disturbed.switches,
+                faults ? "page faults while it answered" : "times its processor was taken away");
+}
+
+/// Table, histogram and memory as text.
+void print_report(const Run& run, const std::string& program, std::size_t nodes) {
+  const std::vector<double> latency = sorted(run.latency), work = sorted(run.work);
+  std::printf("%zu answers, one a millisecond: %s, %zu nodes, %.1f contacts in the mean\n\n",
+              latency.size(), program.c_str(), nodes, run.contacts);
+  std::printf("%-22s %9s %9s %9s %9s\n", "ms", "half", "99 %", "99.9 %", "largest");
+  for (const bool first : {true, false}) {
+    const std::vector<double>& times = first ? latency : work;
+    std::printf("%-22s %9.3f %9.3f %9.3f %9.3f\n", first ? "latency" : "processor's time",
+                quantile(times, 0.5), quantile(times, 0.99), quantile(times, 0.999), times.back());
+  }
+  std::printf("\n%.3f %% within a millisecond; the processor was taken away %.0f times\n\n",
+              100 * (1 - static_cast<double>(run.late) / static_cast<double>(latency.size())),
+              run.disturbed.switches);
+  std::vector<Bin> bins; // four to a power of two
+  for (const Bin& bin : histogram(latency))
+    if (bins.empty() || bin.from >= bins.back().from * 1.18)
+      bins.push_back(bin);
+    else
+      bins.back() = {bins.back().from, bin.to, bins.back().count + bin.count};
+  const auto length = [&](std::size_t count) { return std::log1p(static_cast<double>(count)); };
+  const double most = length(std::ranges::max_element(bins, {}, &Bin::count)->count);
+  for (const Bin& bin : bins)
+    std::printf("%8.3f to %8.3f ms %8zu %s\n", bin.from, bin.to, bin.count,
+                std::string(static_cast<std::size_t>(50 * length(bin.count) / most), '#').c_str());
+  std::printf("\nMB in memory: %.1f at the start, %.1f after a tenth, %.1f at the end\n",
+              run.memory_first, run.memory_before, run.memory_after);
+}
+
 } // namespace
 
 int main(int argc, char** argv) {
@@ -272,25 +335,16 @@ int main(int argc, char** argv) {
     const Served served(tools, folder, 1, w.awake);
     run = drive(served, w, test::mean_edge(model));
   }
-  std::puts("stage,program,nodes,contacts,answers,p50_ms,p99_ms,p999_ms,largest_ms,figure,unit");
-  for (const bool latency : {true, false}) {
-    std::vector<double> times = latency ? run.latency : run.work;
-    std::ranges::sort(times);
-    std::printf("%s,%s,%zu,%.1f,%zu,%.4f,%.4f,%.4f,%.4f,%.4g,%s\n", latency ? "latency" : "work",
-                program.c_str(), model.nodes.size(), run.contacts, times.size(),
-                quantile(times, 0.5), quantile(times, 0.99), quantile(times, 0.999), times.back(),
-                latency ? static_cast<double>(run.late) : run.memory_after - run.memory_before,
-                latency ? "answers too late" : "MB that memory grew in the last nine tenths");
-    if (!w.folder.empty())
-      keep(w.folder, latency ? "latency" : "work", times,
+  const std::size_t nodes = model.nodes.size();
+  if (w.report)
+    print_report(run, program, nodes);
+  else
+    print_csv(run, program, nodes);
+  if (!w.folder.empty())
+    for (const bool latency : {true, false})
+      keep(w.folder, latency ? "latency" : "work", sorted(latency ? run.latency : run.work),
            (latency ? "Answers at 1 kHz, " : "Processor's time of an answer, ") + program + ", " +
                processor());
-  }
-  for (const bool faults : {true, false})
-    std::printf("%s,%s,%zu,%.1f,%zu,,,,,%.4g,%s\n", faults ? "faults" : "switches", program.c_str(),
-                model.nodes.size(), run.contacts, run.latency.size(),
-                faults ? run.disturbed.faults : run.disturbed.switches,
-                faults ? "page faults while it answered" : "times its processor was taken away");
   if (!w.folder.empty()) {
     std::ofstream memory(w.folder + "/memory.csv"), curve(w.folder + "/memory.svg");
     memory << "s,MB\n";

@@ -138,6 +138,23 @@ def dynamics(w, page):
             page.claim(f"{stage} for 0.2 s, within 1 % of its fall: {kind}", "–", f"{min(near):,.3g} ms" if near else "not with these steps")
 
 
+def contact(w, page):
+    """Contact: forces over what they cost."""
+    rows = measured(w, page, "contact_error")
+    theory = [r for r in rows if r["program"] == "Gewebe; d_hat" and isinstance(r["theory_error"], float)]
+    for r in rows:
+        if r["setting"] == 1 and r["program"] in ("Gewebe; d_hat", "Gewebe; stick length"):
+            page.claim(f"{r['stage']}, defaults: error of the force ({r['program'].split('; ')[1]})", "–", f"{r['error']:.2g}, {r['median_ms']:.3g} ms")
+    for r in sorted((r for r in rows if r["program"] == "MuJoCo flex"), key=lambda r: r["error"])[:1]:
+        page.claim(f"{r['stage']}, MuJoCo flex", "–", f"{r['error']:.2g}, {r['median_ms']:,.0f} ms")
+    if theory:
+        page.say(f"Elements have a larger error than contact: with the smallest d_hat the force of the half-space is missed by {theory[-1]['theory_error']:.2g}.")
+    page.say(
+        "The setting is that over its default, for MuJoCo its step, the stiffness of contact and the seconds of the scene for a part of the way. "
+        "MuJoCo's error is that against its own answer with the stiffest contact. MuJoCo has no elastostatic method: it moves the block until it rests, so its time grows with that of the scene."
+    )
+
+
 PAGES = [
     ("work-density", "Work: densities and what is added to them", "Each stage beside peers", density),
     ("work-voxels", "Work: voxels of a mesh", "Each stage beside peers", voxels),
@@ -145,6 +162,7 @@ PAGES = [
     ("work-tetrahedra", "Work and error: tetrahedra", "Each stage beside peers", tetrahedra),
     ("work-factor", "Work: factors", "Each stage beside peers", factor),
     ("work-statics", "Work and error: the shape of a pulled organ", "Each stage beside peers", statics),
+    ("work-contact", "Work and error: contact", "Each stage beside peers", contact),
     ("work-dynamics", "Work and error: motion", "Each stage beside peers", dynamics),
 ]
 

@@ -233,6 +233,49 @@ TEST(Candidates, HoldAllPairsThatComeCloseOnTheWay) {
   }
 }
 
+// Of a large surface only the groups of primitives near the box of the other owner are looked at.
+TEST(Candidates, OfALargeSurfaceAreThoseNearTheOther) {
+  const CollisionSurface surface = test::two_sheets(40, 0.25, 0.1, 0.2, 7);
+  ASSERT_GT(surface.triangles.size(), 2048U);
+  BroadPhase phase(surface);
+  Candidates candidates;
+  const double reach = 0.15;
+  std::mt19937 random(5);
+  for (int round = 0; round < 4; ++round) {
+    // All goes elsewhere in each round, so that boxes of the last one are wrong.
+    std::vector<Vec3> x0 = surface.rest, x1;
+    for (std::size_t v = 0; v < x0.size(); ++v)
+      x0[v] += surface.owner[v] < 2 ? Vec3{9.0 * round, 0, 0} : Vec3{8.0 * round, 3.0 * round, 0};
+    x1 = x0;
+    for (Vec3& p : x1)
+      p += random_point(random, 0.3);
+    phase.find(surface, x0, x1, reach, all_but_self(4), candidates);
+    const std::set<std::array<std::uint32_t, 4>> found(candidates.point_triangle.begin(),
+                                                       candidates.point_triangle.end());
+    EXPECT_EQ(found.size(), candidates.point_triangle.size());
+    std::size_t close = 0;
+    for (const std::uint32_t p : surface.points)
+      for (const auto& t : surface.triangles) {
+        if (surface.owner[p] < 2)
+          continue;
+        const std::array<std::uint32_t, 4> v{p, t[0], t[1], t[2]};
+        for (int step = 0; step <= 10; ++step) {
+          std::array<Vec3, 4> x;
+          for (std::size_t k = 0; k < 4; ++k)
+            x[k] = x0[v[k]] + step / 10.0 * (x1[v[k]] - x0[v[k]]);
+          if (std::sqrt(point_triangle_squared_distance(x)) >= reach + surface.radius[p])
+            continue;
+          ++close;
+          EXPECT_TRUE(found.contains(v)) << round << " " << p;
+          break;
+        }
+      }
+    EXPECT_GT(close, 2U) << round;
+    const auto of_round = [&](const auto& pair) { return surface.owner[pair[0]] > 1; };
+    EXPECT_LT(std::ranges::count_if(candidates.point_triangle, of_round), 400) << round;
+  }
+}
+
 TEST(Candidates, LonePointsAndEdgesAndFixedOnes) {
   CollisionSurface surface;
   surface.rest = {{0, 0, 0}, {0.05, 0, 0}, {0, 1, 0.05}, {0, -1, 0.05}, {9, 9, 9}, {9, 9, 9.05}};
