@@ -48,7 +48,7 @@ struct Material {
   std::optional<double> poisson; ///< Poisson's ratio, 0 to below 1/2; springs do not use it
   /// Of large strains; springs and small strains do not use it. None: the law is left to the user
   /// of the model, see fem/solid_model.h.
-  std::optional<HyperelasticLaw> law;
+  std::optional<HyperelasticLaw> law{};
 
   bool operator==(const Material&) const = default;
 };
