@@ -41,7 +41,7 @@ constexpr double least_at_rest = 0.05;
 /// Of a held body's whole displacement: what moves by less in a step is all but at rest, and no
 /// rounds are spent on the digits of so little. What they leave is before the next steps.
 constexpr double still_part = 1e-5;
-/// Of the displacement where a way to rest begins: one that ends by less counts as this much.
+/// Smallest displacement that errors at rest count against, over that of the start.
 constexpr double rest_part = 1e-6;
 
 double distance(const Numbers& a, const Numbers& b, const Context& context) {
