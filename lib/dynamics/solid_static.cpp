@@ -21,6 +21,10 @@ namespace {
 /// quickest readers of results (single precision, forces within 1e-4) resolve.
 constexpr double tolerance_at_rest = 1e-6;
 constexpr int max_rounds = 60;
+/// Of the volume, inside out: a shape with more is none, as in
+/// integrator/motion_recovery_internal.h. Coarse elements at sharp folds may be so in the shape of
+/// least energy.
+constexpr double scrambled_part = 0.01;
 /// Shortest part of the way to a load.
 constexpr double least_part = 1.0 / 64;
 /// Change of the pressure's forces by a last shape, over all of them; shapes until then, and those
@@ -163,12 +167,19 @@ struct SolidStatic::State {
 
   // ---- shapes
 
+  /// Whether too much of the volume is inside out: a minimum of another kind than tissue has.
   bool is_inside_out() const {
-    const std::span<const double> x = engine.places();
-    return std::ranges::any_of(model.tetrahedra, [&](const Tetrahedron& t) {
-      return !(tetrahedron_volume(vector_at(x, t[0]), vector_at(x, t[1]), vector_at(x, t[2]),
-                                  vector_at(x, t[3])) > 0);
-    });
+    const auto volume = [](std::span<const double> x, const Tetrahedron& t) {
+      return tetrahedron_volume(vector_at(x, t[0]), vector_at(x, t[1]), vector_at(x, t[2]),
+                                vector_at(x, t[3]));
+    };
+    double all = 0, turned = 0;
+    for (const Tetrahedron& t : model.tetrahedra) {
+      const double own = volume(rest, t);
+      all += own;
+      turned += volume(engine.places(), t) > 0 ? 0 : own;
+    }
+    return turned > scrambled_part * all;
   }
 
   bool settle() {

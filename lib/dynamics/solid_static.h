@@ -3,9 +3,9 @@
 //
 // The shape at rest is where a step of infinite length ends (integrator/solid_motion.h): a minimum
 // of elastic energy less the work of the load, sought downhill from the last shape. Pressures
-// follow the surface. Where the way to a load is lost, it is taken in parts, of half the length
-// each time. A shape counts where what is left is below 1e-6 of the displacement, and no element is
-// inside out.
+// follow the surface. Where the way to a load is lost, it is taken in parts, of a quarter
+// each time. A shape counts where what is left is below 1e-6 of the displacement, and at most
+// a hundredth of the volume is inside out.
 //
 // With contact the same step is taken in parts, as that of a moving solid (solid_contact_body.h):
 // rounds of quadratic models, each with the forces of all bodies that touch.
