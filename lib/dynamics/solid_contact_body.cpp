@@ -39,6 +39,8 @@ void SolidContactBody::spread(std::span<const VertexForce> forces) {
 }
 
 double SolidContactBody::linearise(std::span<const VertexForce> forces, std::span<Vec3> step) {
+  if (set_load_)
+    set_load_();
   spread(forces);
   linearised_ = forces_;
   step_.resize(axes_);
@@ -50,6 +52,12 @@ double SolidContactBody::linearise(std::span<const VertexForce> forces, std::spa
   }
   for (std::size_t k = 0; k < vertices_.size(); ++k)
     step[k] = vector_at(std::span<const double>(step_), vertices_[k]);
+  if (!std::isfinite(h_)) {
+    double most = 0;
+    for (const double by : step_)
+      most = std::max(most, std::abs(by));
+    return typical_force_ * most;
+  }
   double energy = 0; // of inertia alone
   for (std::size_t axis = 0; axis < axes_; ++axis)
     energy += motion_.masses()[axis / 3] * step_[axis] * step_[axis];

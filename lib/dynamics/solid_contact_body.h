@@ -10,8 +10,10 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <map>
 #include <span>
+#include <utility>
 #include <vector>
 
 namespace gewebe {
@@ -24,11 +26,14 @@ public:
                    std::size_t nodes)
       : motion_(motion), vertices_(vertices), axes_(3 * nodes) {}
 
-  /// Begins a step. \pre SolidMotion::begin_step was called
+  /// Begins a step, at rest if h is infinite. \pre SolidMotion::begin_step was called
   /// \param last  forces at the end of the last step
   /// \param typical  force, and stiffness without inertia, see ContactBody
   void begin(double h, std::vector<contact::VertexForce> last,
              const contact::TypicalContact& typical, const Context& context);
+  /// Calls `set_load` before each model is built, for a load that follows positions; null: none
+  /// does.
+  void follow(std::function<void()> set_load) { set_load_ = std::move(set_load); }
   /// The step's contact forces over the 3 n axes.
   std::span<const double> forces() const { return forces_; }
 
@@ -46,7 +51,9 @@ public:
     return motion_.relaxation() == 1 ? motion_.matrix_version() : 0;
   }
   void move(double share, std::span<const contact::VertexForce> forces) override;
-  bool keep_momentum(double room) override { return motion_.keep_momentum(forces_, room); }
+  bool keep_momentum(double room) override {
+    return motion_.keep_momentum(forces_, room, context_);
+  }
   bool model_holds() override { return motion_.model_holds(forces_, context_); }
   void sharpen() override { motion_.sharpen(); }
   bool solve_alone() override;
@@ -65,6 +72,7 @@ private:
   std::size_t axes_;
   Context context_;
   double h_ = 0, typical_force_ = 0, stiffness_ = 0;
+  std::function<void()> set_load_;
   std::vector<contact::VertexForce> last_;
   std::vector<double> step_, forces_;
   std::vector<double> linearised_; ///< forces of the quadratic model's state, 3 n

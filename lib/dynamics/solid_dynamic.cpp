@@ -1,5 +1,6 @@
 #include "dynamics/solid_dynamic.h"
 
+#include "dynamics/solid_law.h"
 #include "base/error.h"
 #include "dynamics/spring_force.h"
 #include "fem/assembly.h"
@@ -73,28 +74,11 @@ Net net_of(const Model& model) {
   return net;
 }
 
-/// The law that is chosen; else that of the materials, where one has a law.
-SolidLaw law_of(const Model& model, const std::optional<SolidLaw>& chosen) {
-  std::optional<SolidLaw> law = chosen;
-  for (const std::int32_t number : model.tetrahedron_material) {
-    const Material& m = model.materials[static_cast<std::size_t>(number)];
-    if (!m.law || law == SolidLaw::corotational)
-      continue;
-    if (m.law->kind == HyperelasticLaw::neo_hookean ||
-        (chosen && m.law->kind != HyperelasticLaw::stable_neo_hookean))
-      throw Error("material '" + m.name + "' has the law " + law_text(*m.law) + ", expected " +
-                  (chosen ? "no law= or law=corotational"
-                          : "another one of a solid that moves, such as neo-hookean"));
-    law = SolidLaw::stable_neo_hookean;
-  }
-  return law.value_or(SolidLaw::corotational);
-}
-
 } // namespace
 
 SolidDynamic::SolidDynamic(const Model& model, const SolidChoice& choice, const Context& context)
     : model_(model), context_(context), motion_(model.nodes.size()) {
-  options_.law = law_of(model, choice.law);
+  options_.law = law_of(model, choice.law).value_or(SolidLaw::corotational);
   options_.damping = choice.damping.value_or(options_.damping);
   if (!model.springs.empty())
     options_.max_rounds = rounds_with_springs;

@@ -2,6 +2,7 @@
 
 #include "base/error.h"
 #include "integrator/secants_internal.h"
+#include "linalg/factor.h"
 
 #include <algorithm>
 #include <array>
@@ -19,21 +20,30 @@ struct Way {
   int most; ///< rounds
   /// Whether rounds that change by so much want a matrix of here.
   std::function<bool(double change, double before)> stale;
-  std::function<void(const Numbers& at)> renew; ///< the matrix is that of the last evaluation
+  /// The matrix is that of the last evaluation. \return whether there is none better
+  std::function<bool(const Numbers& at)> renew;
   std::function<void(Numbers&)> solve;
   std::function<void(Numbers&)> into, out; ///< of the frames that solve() and secants are in
   Secants& secants;
-  double& rate;     ///< of changes, that of a second round over the first one's
-  double still = 0; ///< a step of less, mm, counts as one of this much
+  double& rate;       ///< of changes, that of a second round over the first one's
+  double still = 0;   ///< a step of less, mm, counts as one of this much
+  bool turns = false; ///< the matrix may be renewed wherever a round ends
+  /// Changes count against the displacement from rest, and what is left is the sum of all that
+  /// follow at the rate that was seen.
+  bool to_rest = false;
 };
 
 // What a round's change is expected to leave is its part of this many, or of as many as rounds
 // before left: never less than `least`, which a lucky round is no reason for.
 constexpr double least_first = 0.2, least_later = 0.3, doubt = 1.25;
+/// The same at rest.
+constexpr double least_at_rest = 0.05;
 
 /// Of a held body's whole displacement: what moves by less in a step is all but at rest, and no
 /// rounds are spent on the digits of so little. What they leave is before the next steps.
 constexpr double still_part = 1e-5;
+/// Smallest displacement that errors at rest count against, over that of the start.
+constexpr double rest_part = 1e-6;
 
 double distance(const Numbers& a, const Numbers& b, const Context& context) {
   const auto sum = sums_of_axes<1>(
@@ -47,7 +57,7 @@ double distance(const Numbers& a, const Numbers& b, const Context& context) {
 /// The first of the points along the direction, from the whole of it on by halves, whose value is
 /// low enough, into `next`; its part, or 0 if there is none.
 double search(const MotionObjective& o, const MotionPoint& now, const Numbers& direction,
-              double slope, MotionPoint& next, const Context& context) {
+              double slope, bool turns, MotionPoint& next, const Context& context) {
   double s = 1;
   next.at.resize(now.at.size());
   while (s > 1e-14 && slope > 0) {
@@ -55,7 +65,7 @@ double search(const MotionObjective& o, const MotionPoint& now, const Numbers& d
       for (std::size_t axis = begin; axis < end; ++axis)
         next.at[axis] = now.at[axis] - s * direction[axis];
     });
-    o.evaluate(next, context);
+    o.evaluate(next, context, turns);
     if (next.value <= now.value - 1e-4 * s * slope + now.unsure)
       return s;
     s /= 2;
@@ -83,6 +93,13 @@ void learn(const MotionPoint& from, const MotionPoint& to, const Way& way, Motio
 /// What a round that was taken leaves, by what the one before it, or steps before, left.
 void expect(const Way& way, SolidStep& step, double before) {
   const double measured = before < HUGE_VAL ? step.change / before : HUGE_VAL;
+  if (way.to_rest) {
+    // Of two rounds, since they alternate between quick and slow ones.
+    const double rate = std::max(least_at_rest, std::sqrt(way.rate * std::min(measured, 1.0)));
+    way.rate = std::min(measured, 1.0);
+    step.left = rate < 1 ? step.change * rate / (1 - rate) : HUGE_VAL;
+    return;
+  }
   if (step.rounds == 1) {
     step.left = step.change * std::clamp(way.rate, least_first, 1.0);
     way.rate = std::min(1.0, std::max(way.rate, least_first) * doubt);
@@ -105,8 +122,7 @@ void descend(const MotionObjective& o, MotionPoint& now, const Way& way, MotionS
     if (context.cancelled && context.cancelled())
       throw Cancelled();
     if (stuck || way.stale(step.change, before)) {
-      way.renew(now.at);
-      fresh = true;
+      fresh = way.renew(now.at);
       stuck = false;
     }
     before = step.change;
@@ -121,7 +137,7 @@ void descend(const MotionObjective& o, MotionPoint& now, const Way& way, MotionS
       step.change = step.left = 0;
       return;
     }
-    const double s = search(o, now, direction, slope, next, context);
+    const double s = search(o, now, direction, slope, way.turns, next, context);
     if (!(s > 0)) {                   // nothing to be gained, but perhaps with a matrix of here
       o.evaluate(now, context, true); // frames, strains and bubbles are those of the last one
       if (fresh)
@@ -131,7 +147,8 @@ void descend(const MotionObjective& o, MotionPoint& now, const Way& way, MotionS
       continue;
     }
     fresh = false;
-    step.change = s * length / std::max(way.still, distance(next.at, o.state().place, context));
+    const Numbers& from = way.to_rest ? o.body().rest : o.state().place;
+    step.change = s * length / std::max(way.still, distance(next.at, from, context));
     if (s < 1)
       way.secants.forget_earlier();
     learn(now, next, way, scratch, context);
@@ -152,6 +169,7 @@ void descend_quickly(const MotionObjective& objective, MotionPoint& now, MotionQ
     quick.fill(objective.energy().volumes(), context);
     if (!std::exchange(first, false))
       quick.forget();
+    return true;
   };
   double rate = quick.rate();
   quick.secants().begin_step();
@@ -183,6 +201,7 @@ void descend_as_reference(const MotionObjective& objective, MotionPoint& now,
                   tangent.make(objective, at, context);
                   secants.clear();
                   ++step.factorisations;
+                  return true;
                 },
                 [&](Numbers& v) { tangent.solve(v); },
                 stay,
@@ -191,6 +210,85 @@ void descend_as_reference(const MotionObjective& objective, MotionPoint& now,
                 rate};
   MotionScratch scratch;
   descend(objective, now, way, scratch, step, context);
+}
+
+namespace {
+
+/// Changes from which on frames are those of where the body is.
+constexpr double turning_part = 1e-2;
+/// Rounds with one matrix before its rate is known.
+constexpr int rounds_of_rate = 3;
+
+} // namespace
+
+void descend_to_rest(const MotionObjective& objective, MotionPoint& now, MotionQuick& quick,
+                     MotionTangent& tangent, bool& exact, const SolidMotionOptions& options,
+                     SolidStep& step, const Context& context) {
+  Secants& secants = quick.secants();
+  if (!exact)
+    secants.begin_step();
+  const double worth = quick.rounds_of_tangent(objective.body());
+  bool first = true, wants_tangent = false;
+  int rounds = 0; // with this matrix
+  const auto stale = [&](double change, double before) {
+    ++rounds;
+    if (rounds > rounds_of_rate && change > options.tolerance) {
+      const double rate = change / before,
+                   to_come =
+                       rate < 1 ? std::log(options.tolerance / change) / std::log(rate) : HUGE_VAL;
+      wants_tangent = to_come > worth;
+    }
+    return wants_tangent || (!exact && change > turning_part);
+  };
+  const auto renew = [&](const Numbers& at) {
+    const bool begins = std::exchange(first, false), stuck = !begins && step.change == HUGE_VAL;
+    if (stuck || std::exchange(wants_tangent, false)) {
+      secants.clear();
+      rounds = 0;
+      ++step.factorisations;
+      try {
+        tangent.make(objective, at, context);
+        exact = true;
+        return true;
+      } catch (const NotPositiveDefinite&) {
+        exact = false; // what is torn far apart has no tangent in numbers of this length
+      }
+    }
+    if (!exact) {
+      quick.turn(objective.energy(), context);
+      quick.fill(objective.energy().volumes(), context);
+    }
+    return false;
+  };
+  const auto in_frames = [&](auto&& change) {
+    return [&, change](Numbers& v) {
+      if (!exact)
+        change(v);
+    };
+  };
+  double rate = 1;
+  const Way way{.tolerance = options.tolerance,
+                .most = options.max_rounds,
+                .stale = stale,
+                .renew = renew,
+                .solve =
+                    [&](Numbers& v) {
+                      if (exact)
+                        tangent.solve(v);
+                      else
+                        quick.solve(v, context);
+                    },
+                .into = in_frames([&](Numbers& v) { quick.into_frames(v, context); }),
+                .out = in_frames([&](Numbers& v) { quick.out_of_frames(v, context); }),
+                .secants = secants,
+                .rate = rate,
+                .still =
+                    rest_part * distance(objective.state().place, objective.body().rest, context),
+                .turns = true,
+                .to_rest = true};
+  descend(objective, now, way, quick.scratch(), step, context);
+  if (exact)
+    secants.clear(); // they stand in the fixed frame
 }
 
 } // namespace gewebe

@@ -17,4 +17,12 @@ void descend_quickly(const MotionObjective& objective, MotionPoint& now, MotionQ
 void descend_as_reference(const MotionObjective& objective, MotionPoint& now,
                           MotionTangent& tangent, SolidStep& step, const Context& context);
 
+/// Downhill to the shape at rest, by the constant matrix while it serves, then by tangents where
+/// the body is; until what is left is within the tolerance, of the displacement from rest.
+/// `exact`: the tangent that was made serves on; becomes whether it does at the end.
+/// \pre as descend_quickly, of an objective without inertia
+void descend_to_rest(const MotionObjective& objective, MotionPoint& now, MotionQuick& quick,
+                     MotionTangent& tangent, bool& exact, const SolidMotionOptions& options,
+                     SolidStep& step, const Context& context);
+
 } // namespace gewebe

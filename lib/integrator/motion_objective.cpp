@@ -18,6 +18,8 @@ MotionObjective::MotionObjective(const MotionBody& body, const MotionState& stat
       mass_(body.nodes()), ahead_(state.place) {
   for (std::size_t i = 0; i < body.nodes(); ++i)
     mass_[i] = body.masses[i] * body.inertia(i, h);
+  if (!std::isfinite(h))
+    return; // at rest, without inertia
   for (std::size_t axis = 0; axis < body.axes(); ++axis)
     ahead_[axis] += h / (1 + body.drag[axis / 3] * h) * state.velocity[axis];
 }

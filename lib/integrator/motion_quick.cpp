@@ -2,6 +2,7 @@
 
 #include "base/unique_number.h"
 #include "fem/assembly.h"
+#include "linalg/condition.h"
 
 #include <algorithm>
 #include <cmath>
@@ -128,6 +129,36 @@ std::array<double, 9> MotionQuick::frame_of(std::size_t node) const {
   if (!all_still_)
     std::copy_n(rotations_.begin() + static_cast<std::ptrdiff_t>(9 * node), 9, frame.begin());
   return frame;
+}
+
+double MotionQuick::rounds_of_tangent(const MotionBody& body) const {
+  // Nanoseconds on two cores.
+  constexpr double of_product = 0.05, of_entry = 0.25;
+  const bool quadratic = !body.mesh.middles.empty();
+  const double of_element = quadratic ? 5e3 : 2e2, of_element_tangent = quadratic ? 4e4 : 2e3;
+  double products = 0;
+  for (const std::int64_t rows : factor_->view().column_count)
+    products += static_cast<double>(rows) * static_cast<double>(rows);
+  const auto elements = static_cast<double>(body.elements.size());
+  return (of_product * products + of_element_tangent * elements) /
+         (of_entry * static_cast<double>(factor_->entries()) + of_element * elements);
+}
+
+double MotionQuick::condition() const {
+  // Of K, whose columns are those of its lower triangle mirrored.
+  std::vector<double> sums(stiffness_.order());
+  for (std::size_t c = 0; c < stiffness_.order(); ++c)
+    for (auto at = static_cast<std::size_t>(stiffness_.column_start[c]);
+         at < static_cast<std::size_t>(stiffness_.column_start[c + 1]); ++at) {
+      const auto r = static_cast<std::size_t>(stiffness_.row[at]);
+      sums[c] += std::abs(stiffness_.value[at]);
+      if (r != c)
+        sums[r] += std::abs(stiffness_.value[at]);
+    }
+  double norm = 0;
+  for (const double sum : sums)
+    norm = std::max(norm, sum);
+  return norm * inverse_norm(*factor_);
 }
 
 void MotionQuick::forget() {

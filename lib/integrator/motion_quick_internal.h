@@ -58,6 +58,11 @@ public:
   /// The volumes' part of the matrix joins at the places of the last evaluation. \pre turned
   void fill(MotionVolumes& volumes, const Context& context);
 
+  /// How many rounds cost as much as a tangent of this body, by counts of operations. \pre prepared
+  double rounds_of_tangent(const MotionBody& body) const;
+  /// Lower estimate of the condition of the constant matrix. \pre prepared
+  double condition() const;
+
   /// What was learned from other motions.
   void forget();
   Secants& secants() noexcept { return secants_; }

@@ -143,7 +143,7 @@ void MotionRecovery::loosen(const MotionBody& body, const MotionState& state, do
   for (std::size_t t = 0; t < loose.size(); ++t)
     if (loose[t] != 0)
       mesh.material[t] += static_cast<std::int32_t>(materials_.size() / 2);
-  for (const SolidLaw law : {SolidLaw::corotational, SolidLaw::stable_neo_hookean}) {
+  for (const SolidLaw law : {SolidLaw::corotational, SolidLaw::hyperelastic}) {
     if (law == SolidLaw::corotational && !mesh.middles.empty())
       continue;
     SolidMotion soft = make(body, state, mesh, law, options, context);

@@ -13,6 +13,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <span>
 
 namespace gewebe {
@@ -22,10 +23,10 @@ namespace {
 // Elements from where on other threads are worth it, see parallel_blocks_if.
 constexpr std::size_t worth_linear = 128, worth_quadratic = 32;
 
-/// What the turning of the frame adds to the tangent of a corotational element, where positive:
-/// the energy aᵀ m a of a = Rᵀ curl of the displacement, over twice the volume. Exact for linear
-/// elements without damping.
-Matrix3 turning(const SolidElement& element, const ElementFrame& frame) {
+/// What the turning of the frame adds to the tangent of a corotational element: the energy aᵀ m a
+/// of a = Rᵀ curl of the displacement, over twice the volume. Exact for linear elements without
+/// damping. \param positive  only where it is positive
+Matrix3 turning(const SolidElement& element, const ElementFrame& frame, bool positive) {
   const auto [lambda, mu] = element.material;
   const SymmetricBlock& s = frame.stretch;
   const double trace = s[0] + s[3] + s[5];
@@ -35,7 +36,8 @@ Matrix3 turning(const SolidElement& element, const ElementFrame& frame) {
   Eigen::Vector3d value;
   for (int k = 0; k < 3; ++k) {
     const double pair = solver.eigenvalues()[k];
-    value[k] = pair > 0 ? std::max(0.0, mu + (lambda * (trace - 3) - 2 * mu) / pair) : 0;
+    const double own = mu + (lambda * (trace - 3) - 2 * mu) / pair;
+    value[k] = pair > 0 && (own > 0 || !positive) ? own : 0;
   }
   return solver.eigenvectors() * value.asDiagonal() * solver.eigenvectors().transpose();
 }
@@ -56,9 +58,11 @@ Vec3 middle_gradient(const SolidElement& e, std::size_t a, bool quadratic) {
   return e.gradient[i] + e.gradient[j];
 }
 
-/// Tangents of Neo-Hookean elements, bubbles eliminated.
+/// Tangents of Neo-Hookean elements, bubbles eliminated. \param positive  of the positive part of
+/// the energy's second derivative
 std::vector<Numbers> hyperelastic_tangents(const MotionBody& body, const SolidEnergy& energy,
-                                           const Numbers& at, const Context& context) {
+                                           const Numbers& at, bool positive,
+                                           const Context& context) {
   const std::size_t count = solid_nodes(body.mesh);
   const auto order = static_cast<Eigen::Index>(3 * count);
   std::vector<Numbers> of_element(body.elements.size());
@@ -67,8 +71,9 @@ std::vector<Numbers> hyperelastic_tangents(const MotionBody& body, const SolidEn
     HyperelasticResponse response;
     for (std::size_t t = begin; t < end; ++t) {
       const std::array<Vec3, 10> u = energy.displacements(at, t);
-      hyperelastic_response(body.elements[t], std::span(u).first(count), energy.bubble(t),
-                            HyperelasticPart::positive_tangent, response);
+      hyperelastic_response(
+          body.elements[t], std::span(u).first(count), energy.bubble(t),
+          positive ? HyperelasticPart::positive_tangent : HyperelasticPart::tangent, response);
       const Eigen::Map<const Eigen::Matrix<double, 33, 33, Eigen::RowMajor>> k(
           response.tangent.data());
       of_element[t].resize(9 * count * count);
@@ -90,42 +95,62 @@ std::vector<Numbers> hyperelastic_tangents(const MotionBody& body, const SolidEn
 void MotionTangent::make(const MotionObjective& objective, const Numbers& at,
                          const Context& context) {
   made_ = false;
+  // At rest nothing but the tangent itself converges fast; inertia hides what is missing of it.
+  if (!std::isfinite(objective.step())) {
+    try {
+      make(objective, at, false, context);
+      return;
+    } catch (const NotPositiveDefinite&) {
+      // The shape here isn't stable.
+    }
+  }
+  make(objective, at, true, context);
+}
+
+void MotionTangent::make(const MotionObjective& objective, const Numbers& at, bool positive,
+                         const Context& context) {
   const MotionBody& body = objective.body();
   const SolidEnergy& energy = objective.energy();
   const std::size_t count = solid_nodes(body.mesh);
   const bool corotational = energy.law() == SolidLaw::corotational;
   std::vector<Numbers> of_element;
   if (!corotational)
-    of_element = hyperelastic_tangents(body, energy, at, context);
+    of_element = hyperelastic_tangents(body, energy, at, positive, context);
   const double scale = (corotational ? 1 : 0) + objective.damping();
   std::vector<Matrix3> turns(body.elements.size()), frames(body.elements.size());
   for (std::size_t t = 0; t < body.elements.size(); ++t) {
     const ElementFrame frame = energy.frame(t);
     frames[t] = matrix(frame.rotation);
-    turns[t] = corotational ? turning(body.elements[t], frame) : Matrix3(Matrix3::Zero());
+    turns[t] = corotational ? turning(body.elements[t], frame, positive) : Matrix3(Matrix3::Zero());
   }
   const auto block_of = [&](std::size_t t, std::size_t a, std::size_t b) {
+    SolidBlock block{};
+    if (!corotational)
+      for (std::size_t n = 0; n < 9; ++n)
+        block[n] = of_element[t][3 * count * (3 * a + n / 3) + 3 * b + n % 3];
+    if (scale == 0)
+      return block;
     const SolidElement& e = body.elements[t];
     const SolidBlock small = count == 4 ? linear_block(e, a, b) : quadratic_block(e, a, b);
     const Matrix3 ga = cross_matrix(middle_gradient(e, a, count == 10)),
                   gb = cross_matrix(middle_gradient(e, b, count == 10));
     const Matrix3 local = scale * matrix(small) + e.volume * ga.transpose() * turns[t] * gb;
-    SolidBlock block;
-    Eigen::Map<Matrix3> to(block.data());
-    to = frames[t] * local * frames[t].transpose();
-    if (!corotational)
-      for (std::size_t n = 0; n < 9; ++n)
-        block[n] += of_element[t][3 * count * (3 * a + n / 3) + 3 * b + n % 3];
+    const Matrix3 turned = frames[t] * local * frames[t].transpose();
+    for (std::size_t n = 0; n < 9; ++n)
+      block[n] =
+          turned(static_cast<Eigen::Index>(n / 3), static_cast<Eigen::Index>(n % 3)) + block[n];
     return block;
   };
   tangent_ = assembled_matrix(body.mesh, block_of, objective.state().held, context);
   if (!energy.springs().empty())
     tangent_ = energy.springs().with_tangent(tangent_, at, 1 / objective.step());
   add_masses(body, objective.step(), tangent_);
-  if (factor_ && factor_->order() == tangent_.order() && !renewed_)
+  if (factor_ && factor_->order() == tangent_.order() && !renewed_) {
     factor_->refactor(tangent_, context);
-  else
+  } else {
+    factor_.reset();
     factor_.emplace(tangent_, context);
+  }
   renewed_ = false;
   made_ = true;
   version_ = unique_number();

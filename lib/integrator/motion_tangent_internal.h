@@ -21,8 +21,8 @@ public:
   bool is_made() const noexcept { return made_; }
   /// Number of the matrix (base/unique_number.h), a new one by each make().
   std::uint64_t version() const noexcept { return version_; }
-  /// Its factor, positive definite, where the last evaluation was, at `at`. \throw as Factor: then
-  /// it isn't made
+  /// Its factor where the last evaluation was, at `at`: at rest that of the tangent itself, where
+  /// it is positive definite, else of its positive parts. \throw as Factor: then it isn't made
   void make(const MotionObjective& objective, const Numbers& at, const Context& context);
   /// Responses to unit forces along axes, columns of all axes. \pre made
   void unit_responses(std::span<const std::size_t> axes, std::span<double> columns) const;
@@ -30,6 +30,9 @@ public:
   void solve(Numbers& v) const;
 
 private:
+  void make(const MotionObjective& objective, const Numbers& at, bool positive,
+            const Context& context);
+
   bool renewed_ = true, made_ = false;
   std::uint64_t version_ = 0;
   StiffnessMatrix tangent_;

@@ -23,7 +23,7 @@ SolidEnergy::SolidEnergy(const MotionBody& body, const SolidNet& net,
                options.law != SolidLaw::corotational || options.reference}) {
   if (net.bulk > 0)
     volumes_ = MotionVolumes(net.enclosing, body.rest, net.bulk);
-  if (law_ != SolidLaw::stable_neo_hookean)
+  if (law_ != SolidLaw::hyperelastic)
     return;
   if (!body.mesh.middles.empty())
     bubbles_.resize(body.elements.size());
@@ -40,6 +40,7 @@ void SolidEnergy::keep() {
 
 void SolidEnergy::forget_bubbles() {
   std::ranges::fill(bubbles_, Vec3{});
+  new_bubbles_ = bubbles_;
 }
 
 double SolidEnergy::hyperelastic(const Numbers& at, std::span<double> forces,
@@ -54,7 +55,8 @@ double SolidEnergy::hyperelastic(const Numbers& at, std::span<double> forces,
       const std::array<Vec3, 10> u = displacements(at, t);
       Vec3 bubble;
       if (count == 10)
-        bubble = new_bubbles_[t] = settled_bubble(body_.elements[t], u, bubbles_[t]);
+        bubble = new_bubbles_[t] =
+            settled_bubble(body_.elements[t], u, (at_rest_ ? new_bubbles_ : bubbles_)[t]);
       hyperelastic_response(body_.elements[t], std::span(u).first(count), bubble,
                             HyperelasticPart::force, response);
       energy[t] = response.energy;

@@ -37,6 +37,8 @@ public:
   void keep();
   /// Bubbles are sought from rest.
   void forget_bubbles();
+  /// At rest bubbles are sought from those of the last evaluation: there is no step to begin again.
+  void set_at_rest(bool at_rest) noexcept { at_rest_ = at_rest; }
   /// What rounding may add to an energy whatever its size: a Neo-Hookean one is a difference of
   /// numbers of the size of mu.
   double unsure_at_rest() const noexcept { return unsure_at_rest_; }
@@ -67,6 +69,7 @@ private:
   MotionVolumes volumes_;
   CorotationalSolid frames_;                ///< and corotational energy, and damping
   std::vector<Vec3> bubbles_, new_bubbles_; ///< of quadratic Neo-Hookean elements
+  bool at_rest_ = false;
   double elastic_ = 0, unsure_at_rest_ = 0;
 };
 

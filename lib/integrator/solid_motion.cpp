@@ -78,9 +78,15 @@ struct SolidMotion::State {
     Numbers base, step; ///< the iterate when it was linearised, and the model's step from there
     /// Nothing was linearised yet, now and when it was linearised last.
     bool fresh = true, was_fresh = true;
+    /// At rest: A^-1 of what does not balance at the iterate under these forces, by this matrix.
+    struct Unbalanced {
+      std::uint64_t version = 0;
+      Numbers forces, by;
+    } unbalanced{};
     bool exact = false;                         ///< the matrix is a tangent
     bool renews = false;                        ///< ... that of the next round
     bool is_new = false;                        ///< ... and is that of the present round
+    int rounds_of_matrix = 0;                   ///< with the tangent
     bool was_kept = false;                      ///< ... and was made in an earlier step
     double relaxation = 1, next_relaxation = 1; ///< the matrix is over this
     double share = 1;                           ///< of the step that the iterate lacks
@@ -107,6 +113,11 @@ struct SolidMotion::State {
   void limit(SolidStep& step);
   SolidStep step_softly(double h, const Context& context);
   MotionPoint search(const MotionObjective& objective, SolidStep& step, const Context& context);
+  bool balance_at_rest(std::span<const double> forces, double room, const Context& context);
+  bool moves_held_from(const Numbers& at) const;
+  void foresee_held(const Numbers& from, MotionPoint& point, const Context& context);
+  MotionPoint search_rest(const MotionObjective& objective, SolidStep& step,
+                          const Context& context);
 };
 
 SolidMotion::~SolidMotion() = default;
@@ -168,6 +179,7 @@ bool SolidMotion::State::take_tangent() {
 /// Makes the matrix of a model at the point of the last evaluation. \pre open
 void SolidMotion::State::renew_matrix(const Context& context) {
   open->relaxation = open->next_relaxation;
+  ++open->rounds_of_matrix;
   open->is_new = std::exchange(open->renews, false);
   if (quick.wants_tangent()) {
     open->is_new = open->is_new || !quick.has_tangent();
@@ -175,6 +187,7 @@ void SolidMotion::State::renew_matrix(const Context& context) {
       quick.take_tangent(body, energy.springs(), open->point.at, context);
   } else if (open->is_new) {
     tangent.make(open->objective, open->point.at, context);
+    open->rounds_of_matrix = 0;
     ++open->counts.factorisations;
     open->exact = true;
     open->was_kept = false;
@@ -230,10 +243,112 @@ SolidStep SolidMotion::State::step_softly(double h, const Context& context) {
   return step;
 }
 
+/// The part of a move of held axes by which forces are found that it takes, by differences.
+constexpr double part_of_move = 1e-5;
+/// What may be left of a shape in contact, over the displacement.
+constexpr double left_in_contact = 3e-5;
+
+/// Whether the forces balance at the iterate, or do so once it has moved by no more than `room`.
+bool SolidMotion::State::balance_at_rest(std::span<const double> forces, double room,
+                                         const Context& context) {
+  if (open->share != 0)
+    return false;
+  if (!std::exchange(open->evaluated, true))
+    open->objective.evaluate(open->found, context, true);
+  Numbers by = open->found.gradient;
+  for (std::size_t axis = 0; axis < body.axes(); ++axis)
+    if (now.held[axis] == 0)
+      by[axis] -= forces[axis];
+  solve_open(by, context);
+  open->unbalanced = {matrix_version, Numbers(forces.begin(), forces.end()), by};
+  double most = 0, displaced = 0;
+  for (std::size_t axis = 0; axis < body.axes(); ++axis) {
+    most = std::max(most, std::abs(by[axis]));
+    displaced = std::max(displaced, std::abs(open->found.at[axis] - body.rest[axis]));
+  }
+  if (!(most <= room))
+    return most <= left_in_contact * displaced;
+  for (std::size_t axis = 0; axis < body.axes(); ++axis)
+    if (now.held[axis] == 0)
+      open->found.at[axis] -= by[axis];
+  open->evaluated = false;
+  open->unbalanced = {};
+  return true;
+}
+
+/// Whether held axes are to go elsewhere than they are.
+bool SolidMotion::State::moves_held_from(const Numbers& at) const {
+  if (!moved)
+    return false;
+  for (std::size_t axis = 0; axis < body.axes(); ++axis)
+    if (now.held[axis] != 0 && body.rest[axis] + target[axis] != at[axis])
+      return true;
+  return false;
+}
+
+/// What the energy and its derivatives become to second order when held axes go to their targets
+/// and the rest stays: what is so near to them may be inside out there. \param point  becomes that
+void SolidMotion::State::foresee_held(const Numbers& from, MotionPoint& point,
+                                      const Context& context) {
+  Numbers by(body.axes());
+  for (std::size_t axis = 0; axis < body.axes(); ++axis)
+    if (now.held[axis] != 0)
+      by[axis] = body.rest[axis] + target[axis] - from[axis];
+  MotionPoint near;
+  near.at = from;
+  add(near.at, part_of_move, by);
+  open->objective.evaluate(near, context);
+  point.at = from;
+  open->objective.evaluate(point, context, true);
+  for (std::size_t axis = 0; axis < body.axes(); ++axis) {
+    const double change = (near.forces[axis] - point.forces[axis]) / part_of_move;
+    point.value += by[axis] * (point.forces[axis] + change / 2);
+    point.forces[axis] += change;
+    if (now.held[axis] == 0)
+      point.gradient[axis] += change;
+    else
+      point.at[axis] = body.rest[axis] + target[axis];
+  }
+}
+
+/// Where the body is at rest.
+MotionPoint SolidMotion::State::search_rest(const MotionObjective& objective, SolidStep& step,
+                                            const Context& context) {
+  MotionPoint found;
+  found.at = now.place;
+  energy.note_frames();
+  if (moves_held_from(now.place)) {
+    foresee_held(now.place, found, context);
+    quick.turn(energy, context);
+    quick.fill(energy.volumes(), context);
+    MotionPoint ahead;
+    ahead.at = found.at;
+    Numbers way = found.gradient;
+    quick.into_frames(way, context);
+    quick.solve(way, context);
+    quick.out_of_frames(way, context);
+    add(ahead.at, -1, way);
+    for (std::size_t axis = 0; axis < body.axes(); ++axis)
+      if (now.held[axis] != 0)
+        ahead.at[axis] = found.at[axis];
+    objective.evaluate(ahead, context);
+    objective.evaluate(found, context);
+    if (ahead.value <= found.value)
+      found = std::move(ahead);
+  }
+  objective.evaluate(found, context, true);
+  bool exact = open->exact;
+  descend_to_rest(objective, found, quick, tangent, exact, options, step, context);
+  open->exact = exact;
+  return found;
+}
+
 /// Where a step ends under the load.
 MotionPoint SolidMotion::State::search(const MotionObjective& objective, SolidStep& step,
                                        const Context& context) {
   const double h = objective.step();
+  if (!std::isfinite(h))
+    return search_rest(objective, step, context);
   MotionPoint found;
   found.at = now.place;
   add(found.at, h, now.velocity);
@@ -264,7 +379,10 @@ MotionPoint SolidMotion::State::search(const MotionObjective& objective, SolidSt
 }
 
 void SolidMotion::set_load(std::span<const double> forces) {
-  state_->now.load.assign(forces.begin(), forces.end());
+  State& s = *state_;
+  if (s.open && !std::ranges::equal(s.now.load, forces))
+    s.open->evaluated = false;
+  s.now.load.assign(forces.begin(), forces.end());
 }
 
 void SolidMotion::hold(std::span<const std::uint8_t> held) {
@@ -330,10 +448,30 @@ SolidStep SolidMotion::step(double h, const Context& context) {
   return step;
 }
 
+SolidStep SolidMotion::settle(const Context& context) {
+  begin_step(HUGE_VAL, context);
+  solve_alone(context);
+  const SolidStep found = state_->open->counts;
+  SolidStep step = end_step({}, context);
+  step.change = found.change;
+  step.left = found.left;
+  return step;
+}
+
+double SolidMotion::condition(const Context& context) {
+  State& s = *state_;
+  (void)s.quick.prepare(s.body, s.energy.springs(), s.now.held, HUGE_VAL, s.options, context);
+  return s.quick.condition();
+}
+
 void SolidMotion::begin_step(double h, const Context& context) {
   State& s = *state_;
   s.open.reset();
-  s.recovery.look(s.body, s.now, s.elastic, h, s.options, context);
+  s.energy.set_at_rest(!std::isfinite(h));
+  if (std::isfinite(h))
+    s.recovery.look(s.body, s.now, s.elastic, h, s.options, context);
+  else
+    s.recovery.end();
   if (s.recovery.on()) {
     SolidMotion& soft = s.recovery.soft();
     soft.set_load(s.now.load);
@@ -365,11 +503,14 @@ void SolidMotion::linearise_step(std::span<double> step, std::span<const double>
   State::Open& open = *s.open;
   open.base = open.found.at;
   MotionPoint& point = open.point;
-  if (open.evaluated) {
+  const bool at_rest = !std::isfinite(open.objective.step());
+  if (at_rest && s.moves_held_from(open.base)) {
+    s.foresee_held(open.base, point, context);
+  } else if (open.evaluated) {
     point = open.found;
   } else {
     point.at = open.base;
-    if (open.fresh)
+    if (open.fresh && !at_rest)
       add(point.at, open.objective.step(), s.now.velocity);
     for (std::size_t axis = 0; axis < s.body.axes(); ++axis)
       if (s.now.held[axis] != 0)
@@ -377,12 +518,19 @@ void SolidMotion::linearise_step(std::span<double> step, std::span<const double>
     open.objective.evaluate(point, context, true);
   }
   s.renew_matrix(context);
-  Numbers direction = point.gradient;
-  for (std::size_t axis = 0; axis < s.body.axes(); ++axis)
-    if (s.now.held[axis] == 0)
-      direction[axis] -= forces[axis];
-  s.solve_open(direction, context);
-  ++open.counts.rounds;
+  Numbers direction;
+  if (open.evaluated && open.exact && open.unbalanced.version == s.matrix_version &&
+      std::ranges::equal(open.unbalanced.forces, forces)) {
+    direction = std::move(open.unbalanced.by);
+  } else {
+    direction = point.gradient;
+    for (std::size_t axis = 0; axis < s.body.axes(); ++axis)
+      if (s.now.held[axis] == 0)
+        direction[axis] -= forces[axis];
+    s.solve_open(direction, context);
+    ++open.counts.rounds;
+  }
+  open.unbalanced = {};
   open.step.resize(s.body.axes());
   for (std::size_t axis = 0; axis < s.body.axes(); ++axis)
     open.step[axis] = point.at[axis] -
@@ -429,6 +577,7 @@ void SolidMotion::move_iterate(double share, std::span<const double> change,
   }
   State::Open& open = *s.open;
   open.evaluated = false;
+  open.unbalanced = {};
   open.share = share;
   open.found.at = open.base;
   const bool still = std::ranges::all_of(change, [](double f) { return f == 0; });
@@ -455,8 +604,8 @@ bool SolidMotion::model_holds(std::span<const double> forces, const Context& con
   State::Open& open = *s.open;
   if (open.share != 0)
     return true;
-  open.objective.evaluate(open.found, context, true);
-  open.evaluated = true;
+  if (!std::exchange(open.evaluated, true))
+    open.objective.evaluate(open.found, context, true);
   // The model's energy at the iterate, where its gradient is that of the forces, and what it is
   // below that at the point.
   double model = open.point.value, quadratic = 0;
@@ -480,19 +629,27 @@ bool SolidMotion::model_holds(std::span<const double> forces, const Context& con
 
 void SolidMotion::sharpen() {
   State& s = *state_;
-  if (s.recovery.on())
+  if (s.recovery.on()) {
     s.recovery.soft().sharpen();
-  else
+    return;
+  }
+  // At rest, where a tangent serves for long, another one has to be worth its cost.
+  const bool early = !std::isfinite(s.open->objective.step()) && s.open->exact &&
+                     2 * s.open->rounds_of_matrix < s.quick.rounds_of_tangent(s.body);
+  if (!early)
     (void)s.take_tangent();
 }
 
-bool SolidMotion::keep_momentum(std::span<const double> forces, double room) {
+bool SolidMotion::keep_momentum(std::span<const double> forces, double room,
+                                const Context& context) {
   State& s = *state_;
   if (s.recovery.on())
-    return s.recovery.soft().keep_momentum(forces, room);
+    return s.recovery.soft().keep_momentum(forces, room, context);
+  State::Open& open = *s.open;
+  if (!std::isfinite(open.objective.step()))
+    return s.balance_at_rest(forces, room, context);
   if (s.now.any_held())
     return true;
-  State::Open& open = *s.open;
   const RigidChange by = open.objective.balance(open.found.at, forces);
   if (!(by.largest <= room))
     return false;
@@ -508,10 +665,9 @@ void SolidMotion::solve_alone(const Context& context) {
     return;
   }
   State::Open& open = *s.open;
-  const int made = open.counts.factorisations;
+  open.counts.change = open.counts.left = HUGE_VAL;
   open.found = s.search(open.objective, open.counts, context);
   open.evaluated = false;
-  open.counts.factorisations = made;
   if (!s.now.any_held())
     open.objective.keep_both_momenta(open.found);
 }
@@ -526,6 +682,10 @@ void SolidMotion::begin_iterate_again() {
   s.open->found.at = s.now.place;
   s.open->evaluated = false;
   s.open->fresh = true;
+}
+
+bool SolidMotion::is_sharp() const noexcept {
+  return state_->open->exact;
 }
 
 bool SolidMotion::moves_held() const noexcept {
@@ -579,7 +739,8 @@ SolidStep SolidMotion::end_step(std::span<const double> forces, const Context& c
   }
   if (s.last_step != h)
     s.forecast.clear();
-  s.forecast.add(std::move(acceleration), s.body.masses, context);
+  if (std::isfinite(h))
+    s.forecast.add(std::move(acceleration), s.body.masses, context);
   s.now.place = std::move(open.found.at);
   s.elastic = s.energy.elastic();
   s.last_step = h;

@@ -34,6 +34,10 @@
 // may stay wound up, in a minimum of their own with every element right side out: 255 of the first,
 // a quarter of quadratic ones.
 //
+// A step of infinite length is statics: the same minimum without inertia and damping. Rounds of the
+// constant matrix are few where strains are small. Elsewhere, and where the material is all but
+// incompressible, tangents serve, each for several rounds with secants on top.
+//
 // Springs may move along with the elements: those of nets that are tied to a solid, and the ties.
 // The constant matrix has their stiffness along every axis, which bounds them however they turn: of
 // springs alone, held by whole nodes, it is one of nodes that serves each axis.
@@ -59,7 +63,7 @@ namespace gewebe {
 
 /// Small strains in frames that rotate; or the hyperelastic law of each material, stable
 /// Neo-Hookean unless it is said otherwise, never the classical one.
-enum class SolidLaw { corotational, stable_neo_hookean };
+enum class SolidLaw { corotational, hyperelastic };
 
 struct SolidMotionOptions {
   SolidLaw law = SolidLaw::corotational;
@@ -141,6 +145,16 @@ public:
   /// the 3 n axes, read where they are held.
   void move_held(std::span<const double> displacement);
 
+  /// To rest under the load, held axes where they are moved to: the step of infinite length, which
+  /// has no inertia and no damping, downhill from here. It ends where what is left is within the
+  /// tolerance, of the displacement from rest, or `left` says more. It doesn't depend on steps
+  /// before. \throw NotPositiveDefinite if what is held leaves the body free to move; as Factor;
+  /// Cancelled
+  SolidStep settle(const Context& context);
+  /// Lower estimate of the condition of the stiffness at rest with what is held now, 1e12 or more
+  /// if the body is free to move. \throw as settle
+  double condition(const Context& context);
+
   /// On by h seconds. Where nothing is held and moved during the step, energy (of motion, of
   /// elements and of the load) doesn't grow: what the nonlinearity or unfinished rounds would add
   /// is taken from the speeds, at last from those of the body as a whole. A body that is held
@@ -169,8 +183,9 @@ public:
   // each round lowers the energy of all that takes part (majorisation and minimisation: Hunter,
   // Lange, A tutorial on MM algorithms, The American Statistician 58(1), 2004).
 
-  /// Begins a step of h; the iterate is the present position. An open step is abandoned without a
-  /// trace. \pre h > 0, set_load and move_held were called for this step \throw as step
+  /// Begins a step of h, which may be infinite (see settle); the iterate is the present position.
+  /// An open step is abandoned without a trace. \pre h > 0, set_load and move_held were called for
+  /// this step \throw as step
   void begin_step(double h, const Context& context);
   /// Builds the model around the iterate, at first around where the motion leads.
   /// \param forces  f_0 that act beside the load, 3 n
@@ -196,10 +211,13 @@ public:
   bool model_holds(std::span<const double> forces, const Context& context);
   /// Models of this step are of the tangent from now on, where there is one.
   void sharpen();
+  /// Whether the last model of the open step was of a tangent.
+  bool is_sharp() const noexcept;
   /// Translates the iterate of a body that is held nowhere so that its momentum is that of load and
   /// forces, where that takes at most `room` mm: the constant matrix moves a strained body not
-  /// quite by what its forces say. \param forces  f, 3 n \return whether the momentum is right
-  bool keep_momentum(std::span<const double> forces, double room);
+  /// quite by what its forces say. At rest it moves to where forces balance. \param forces  f, 3 n
+  /// \return whether the momentum is right, or forces balance within 3e-5 of the displacement
+  bool keep_momentum(std::span<const double> forces, double room, const Context& context);
   /// Moves the iterate to where the step ends under the load alone, as step() finds it.
   void solve_alone(const Context& context);
   /// The iterate is where the step began, once more.

@@ -143,7 +143,7 @@ void carry_out(World& w, std::size_t index, CutModel cut) {
   // Parts and instruments need the shape before the cut. Without them it may never be read.
   const bool deferred = ffe && !old.shown.shaped && free.parts.empty() &&
                         w.now.instruments.empty() && old.matter->known && !old.stages.options &&
-                        !old.warp && !old.meets;
+                        !old.warp && !has_law(old) && !old.meets;
   if (ffe && !deferred)
     (void)whole_shape_in_step(w, old);
   const Moves moves = moves_of(w, index, cut, free);
@@ -161,7 +161,7 @@ void carry_out(World& w, std::size_t index, CutModel cut) {
   const auto now = std::make_shared<const Model>(std::move(rest.model));
   std::shared_ptr<ComplianceSource> prepared;
   bool loose = !old.came.velocity.empty();
-  if (ffe) {
+  if (ffe && !has_law(old)) {
     if (old.statics->made() || old.statics->stiffness)
       old.statics->ahead = true;
     try {
@@ -220,7 +220,7 @@ void carry_out(World& w, std::size_t index, CutModel cut) {
 /// That the object will be cut, so that its first cut costs no more than others.
 void announce_cut(World& w, std::size_t index) {
   Object& object = w.now.objects.at(index);
-  if (object.method != Method::ffe || gap_of(object, Feature::cut) != nullptr)
+  if (object.method != Method::ffe || has_law(object) || gap_of(object, Feature::cut) != nullptr)
     return;
   try {
     if (CutStiffness* const stiffness = stiffness_of(w, object); stiffness != nullptr)
@@ -352,7 +352,9 @@ void find_free_motion(World& w, std::size_t index) {
       (object.load->empty() && !instruments_there(w)))
     return;
   try {
-    if (object.warp)
+    if (has_law(object))
+      strained_of(w, object).prepare(acting_at(object, w.now.clock.time));
+    else if (object.warp)
       (void)warped_of(w, object);
     else if (solver_of(w, object).is_free())
       require_held(w, object);

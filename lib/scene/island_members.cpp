@@ -87,6 +87,10 @@ Load load_between(const Load& from, const Load& to, std::span<const double> shap
       const Vec3 stood = vector_at(shape, node);
       u = stood + part * (u - stood);
     }
+  for (auto& [node, p] : load.pressure)
+    p.pressure *= part;
+  for (const auto& [node, p] : from.pressure)
+    load.pressure[node].pressure += (1 - part) * p.pressure;
   load.gravity = from.gravity + part * (to.gravity - from.gravity);
   return load;
 }
@@ -128,24 +132,34 @@ contact::ContactBody& StaticMember::begin(double /*from*/, double to, const Cont
                          (to - way_->start) / (way_->end - way_->start));
   else
     load_ = given_ ? *given_ : acting_at(object, to);
-  StaticContactState state{&object.model(),
-                           &surface_.node,
-                           &load_,
-                           *object.shown.displacement,
-                           {},
-                           [this, &object](std::span<const double> u) {
-                             at_object(w_, object, [&] { require_bounded(object, u); });
-                           }};
+  std::vector<contact::VertexForce> last;
   for (const NodalContactForce& f : object.touching) {
     const auto found = std::ranges::lower_bound(surface_.node, f.node);
     if (found == surface_.node.end() || *found != f.node)
       continue; // its wall of a cut is gone
     const auto vertex = static_cast<std::uint32_t>(found - surface_.node.begin());
-    if (!state.forces.empty() && state.forces.back().vertex == vertex)
-      state.forces.back().force += f.force;
+    if (!last.empty() && last.back().vertex == vertex)
+      last.back().force += f.force;
     else
-      state.forces.push_back({vertex, f.force});
+      last.push_back({vertex, f.force});
   }
+  if (has_law(object)) {
+    contact::ContactBody* body = nullptr;
+    at_object(w_, object, [&] {
+      strained_ = &strained_of(w_, object);
+      strained_->restore(object.strained);
+      body = &strained_->begin_contact(load_, std::move(last));
+    });
+    return *body;
+  }
+  StaticContactState state{&object.model(),
+                           &surface_.node,
+                           &load_,
+                           *object.shown.displacement,
+                           std::move(last),
+                           [this, &object](std::span<const double> u) {
+                             at_object(w_, object, [&] { require_bounded(object, u); });
+                           }};
   if (object.warp)
     body_ = std::make_unique<WarpedContactBody>(
         std::move(state), [this, &object]() -> WarpedStatics& { return warped_of(w_, object); });
@@ -166,9 +180,16 @@ void StaticMember::end(std::span<const Force> forces, double /*h*/, const Contex
   object.touching = nodal_forces(forces, surface_.node, instrument_of_piece_);
   if (held_)
     return;
-  if (forces.empty() && body_->acting().force != load_.force)
-    body_->move(0, {}); // without rounding of forces that have gone
-  const std::span<const double> u = body_->displacement();
+  std::span<const double> u;
+  if (strained_ != nullptr) {
+    strained_->end_contact();
+    object.strained = strained_->answer();
+    u = strained_->displacement();
+  } else {
+    if (forces.empty() && body_->acting().force != load_.force)
+      body_->move(0, {}); // without rounding of forces that have gone
+    u = body_->displacement();
+  }
   object.shown.displacement.replace().assign(u.begin(), u.end());
   object.shown.whole = {};
   object.shown.box.reset();

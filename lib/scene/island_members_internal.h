@@ -109,6 +109,7 @@ private:
   std::optional<Load> given_;
   std::optional<Way> way_;
   std::unique_ptr<StaticContactBody> body_;
+  SolidStatic* strained_ = nullptr;         ///< instead of body_ if the object has a law
   std::unique_ptr<contact::HeldBody> held_; ///< instead of body_ if the model holds all nodes
 };
 

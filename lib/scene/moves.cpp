@@ -45,6 +45,7 @@ Object renumbered(const Object& old, std::shared_ptr<const Model> model) {
     next.matter->shortest_edge = 0; // else it stays: a cut of a net makes none shorter
   next.statics = std::make_shared<Statics>();
   next.warped = nullptr;
+  next.strained = nullptr;
   next.load = gravity_of(*old.load);
   next.hung = {};
   next.body = nullptr;

@@ -1,8 +1,10 @@
 // Objects of a scene: what they consist of, read when it is needed.
 
+#include "dynamics/solid_law.h"
 #include "scene/world_internal.h"
 
 #include <memory>
+#include <optional>
 #include <utility>
 
 namespace gewebe::simulation {
@@ -16,10 +18,20 @@ void insert(World& w, Object object) {
   w.now.objects.push_back(std::move(object));
 }
 
+std::optional<SolidLaw> law_of(const Object& object) {
+  const std::optional<SolidLaw>& chosen = object.matter->solid.law;
+  return object.matter->known ? gewebe::law_of(object.model(), chosen) : chosen;
+}
+
 void need_model(Object& object) {
   if (object.matter->known)
     return;
   object.matter->model = std::make_shared<const Model>(object.matter->source.model());
+  try {
+    (void)gewebe::law_of(object.model(), object.matter->solid.law);
+  } catch (const Error& error) {
+    throw Error("object " + object.name() + ": " + error.what());
+  }
   object.shown.displacement.replace().assign(3 * object.model().nodes.size(), 0);
   object.matter->known = true;
 }

@@ -13,6 +13,9 @@ void Rule<Prepare>::check(World& w, const Prepare& c) {
     require_support(w, object, Feature::cut);
   if (c.contact)
     require_support(w, object, Feature::touch);
+  if (!c.nodes_ahead.empty() && has_law(object))
+    throw Error("object " + object.name() +
+                " has large strains (law=), expected no nodes to prepare");
   if (!c.nodes_ahead.empty() && object.warp)
     throw Error("object " + object.name() +
                 " has large rotations (rotation=warp), expected no nodes to prepare");
@@ -24,7 +27,9 @@ void Rule<Prepare>::apply(World& w, const Prepare& c) {
   if (is_held_altogether(object))
     return;
   object.statics->ahead = true;
-  if (object.warp) {
+  if (has_law(object)) {
+    strained_of(w, object).prepare(acting_at(object, w.now.clock.time));
+  } else if (object.warp) {
     (void)warped_of(w, object);
   } else {
     Elastostatic& solver = solver_of(w, object);

@@ -9,6 +9,7 @@
 #include "contact/nodal_contact_force.h"
 #include "dynamics/body_motion.h"
 #include "dynamics/solid_dynamic.h"
+#include "dynamics/solid_static.h"
 #include "scene/extents.h"
 #include "scene/simulation.h"
 #include "scene/support.h"
@@ -85,13 +86,14 @@ struct Statics {
   std::optional<Elastostatic> solver;
   std::optional<TwoStep> two_step;            // over `solver`, made when needed
   std::optional<WarpedStatics> warped;        // in place of both
+  std::optional<SolidStatic> strained;        // in place of all
   std::shared_ptr<ComplianceSource> prepared; // of the cut model, by cut_source
   std::unique_ptr<CutStiffness> stiffness;    // source of `prepared`
   ElastostaticCounts spent;                   // by solvers that have been dropped
   int slow = 0;                               // updates in a row that took too long for the rate
   bool ahead = false;                         // it has changed since the scene was saved
 
-  bool made() const { return solver || warped; }
+  bool made() const { return solver || warped || strained; }
 };
 
 /// Body with one integrator: one elastodynamic object, or several that are attached to each other.
@@ -197,6 +199,7 @@ struct Object {
   bool warp = false;                          // large rotations
   bool meets = false;                         // a SetContact names it
   std::shared_ptr<const WarpedAnswer> warped; // last result, the start of the next iteration
+  std::shared_ptr<const SolidRest> strained;  // the same under large strains
   std::shared_ptr<Body> body;                 // of an elastodynamic object
   std::size_t offset = 0;                     // of its nodes in the body
   Shown shown;

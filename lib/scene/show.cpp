@@ -108,7 +108,7 @@ bool may_leave_range(Object& object, double max) {
 
 /// Once, where the shape that is shown is not to be trusted.
 void warn_of_range(World& w, Object& object) {
-  if (object.range.warned)
+  if (object.range.warned || has_law(object))
     return;
   // The range can be left only where something moves far.
   double max = 0;
@@ -162,7 +162,7 @@ void shape(World& w, Object& object) {
     return;
   }
   find_shape(w, object, static_rough_surface);
-  shown.rough = w.options.tolerance > 0 && !object.warp;
+  shown.rough = w.options.tolerance > 0 && !object.warp && !has_law(object);
   warn_of_range(w, object);
 }
 
@@ -238,7 +238,13 @@ void begin_showing(World& w, Object& object) {
 }
 
 Load acting_at(const Object& object, double time) {
-  Load load = load_at(*object.load, object.model(), time);
+  Load given = *object.load;
+  std::map<std::uint32_t, NodePressure> pressures;
+  if (has_law(object)) // pressures follow the surface
+    pressures = std::exchange(given.pressure, {});
+  Load load = load_at(given, object.model(), time);
+  for (const auto& [node, p] : pressures)
+    load.pressure[node] = {p.pressure * pulse(time, p.period), 0};
   if (load.gravity != Vec3{})
     for (const auto& [node, mass] : *object.hung)
       load.force[node] += mass * load.gravity;

@@ -75,7 +75,9 @@ void Simulation::add_object(const std::string& name, Model model, Method method,
   object.method = method;
   need_model(object);
   object.matter->source = {};
-  if (method == Method::ffe && !is_held_altogether(object))
+  if (method == Method::ffe && has_law(object))
+    (void)strained_of(w, object);
+  else if (method == Method::ffe && !is_held_altogether(object))
     make_solver(w, object, std::move(source));
   insert(w, std::move(object));
   if (method == Method::ffe)
@@ -121,8 +123,8 @@ ObjectFacts Simulation::object(std::size_t object) const {
           one.body != nullptr && !one.body->moving->resting(),
           one.stages.model != nullptr,
           one.warp,
-          one.method == Method::ela && one.matter->known && is_solid(one),
-          one.matter->solid.law.value_or(SolidLaw::corotational),
+          (one.method == Method::ela || has_law(one)) && one.matter->known && is_solid(one),
+          law_of(one).value_or(SolidLaw::corotational),
           *one.cut.first_nodes,
           *one.cut.places};
 }

@@ -99,13 +99,15 @@ struct SimulationCounts {
 struct ObjectFacts {
   const std::string& name;
   Method method = Method::ela;
-  bool known = false;                    ///< its model has been read
-  bool shaped = false;                   ///< and displacement() costs little, changes nothing
-  bool awake = false;                    ///< elastodynamic, and not at rest
-  bool staged = false;                   ///< the model of its second stage has been read
-  bool warp = false;                     ///< with large rotations
-  bool moving_solid = false;             ///< with tetrahedra, and elastodynamic
-  SolidLaw law = SolidLaw::corotational; ///< of a moving solid
+  bool known = false;  ///< its model has been read
+  bool shaped = false; ///< and displacement() costs little, changes nothing
+  bool awake = false;  ///< elastodynamic, and not at rest
+  bool staged = false; ///< the model of its second stage has been read
+  bool warp = false;   ///< with large rotations
+  /// With tetrahedra, and elastodynamic or with large strains: strains are those in the frames of
+  /// its elements.
+  bool element_frames = false;
+  SolidLaw law = SolidLaw::corotational; ///< of such a solid
   /// By node: its node in the first model, or the node that it is a copy of. Empty: unchanged.
   std::span<const std::uint32_t> first_nodes;
   /// By node of the first model: its present number, or CutModel::gone. Empty: unchanged.

@@ -1,4 +1,5 @@
-// The solvers of elastostatic objects: of one step, of two, made when they are needed.
+// The solvers of elastostatic objects: of one step, of two, of large rotations and of large
+// strains, made when they are needed.
 
 #include "fem/model_stiffness.h"
 #include "linalg/stiffness.h"
@@ -49,6 +50,16 @@ std::shared_ptr<ComplianceSource> source_of(Object& object) {
 
 /// What its solver did so far.
 ElastostaticCounts counts_of(const Statics& statics) {
+  if (statics.strained) {
+    const SolidStaticCounts counts = statics.strained->counts();
+    ElastostaticCounts all;
+    all.updates = counts.updates;
+    all.unchanged = counts.unchanged;
+    all.shapes = counts.shapes;
+    all.factors = counts.factors;
+    all.rounds = counts.rounds;
+    return all;
+  }
   if (!statics.warped)
     return statics.solver ? statics.solver->counts() : ElastostaticCounts{};
   const WarpedCounts counts = statics.warped->counts();
@@ -84,6 +95,45 @@ WarpedStatics& warped_of(World& w, Object& object) {
   return *statics.warped;
 }
 
+namespace {
+
+/// Where an object with a law stands, as the start of its first shape; null: at rest.
+std::shared_ptr<const SolidRest> shown_rest(const Object& object) {
+  const std::vector<double>& u = *object.shown.displacement;
+  if (!object.shown.shaped || u.size() != 3 * object.model().nodes.size() ||
+      std::ranges::all_of(u, [](double x) { return x == 0; }))
+    return nullptr;
+  auto rest = std::make_shared<SolidRest>();
+  rest->load = acting_load(object.shown);
+  rest->balanced = false;
+  for (std::size_t i = 0; i < object.model().nodes.size(); ++i)
+    for (int a = 0; a < 3; ++a)
+      rest->places.push_back(object.model().nodes[i].position[a] +
+                             u[3 * i + static_cast<std::size_t>(a)]);
+  return rest;
+}
+
+} // namespace
+
+SolidStatic& strained_of(World& w, Object& object) {
+  need_model(object);
+  std::optional<SolidStatic>& strained = object.statics->strained;
+  if (strained)
+    return *strained;
+  if (!is_solid(object))
+    throw Error("object " + object.name() +
+                " has no tetrahedra, expected a solid for law=, damping= and tolerance=");
+  if (!object.model().springs.empty() || body_count(object.model()) != object.model().nodes.size())
+    throw Error("object " + object.name() +
+                " has springs beside its tetrahedra, expected tetrahedra alone for law= at rest");
+  object.statics->ahead = true;
+  strained.emplace(object.model(), *law_of(object), w.context);
+  if (!object.strained)
+    object.strained = shown_rest(object);
+  strained->restore(object.strained);
+  return *strained;
+}
+
 ElastostaticCounts static_counts(const Object& object) {
   const Statics& statics = *object.statics;
   ElastostaticCounts all = statics.spent;
@@ -103,6 +153,7 @@ void renew(Object& object) {
   add_counts(statics.spent, counts_of(statics));
   statics.solver.reset();
   statics.warped.reset();
+  statics.strained.reset();
   if (statics.two_step) {
     ElastostaticCounts second = statics.two_step->second_counts();
     second.updates = second.unchanged = 0; // those of the first stage count
@@ -126,6 +177,13 @@ TwoStep& two_step_of(World& w, Object& object) {
 }
 
 void update_stages(World& w, Object& object, const Load& load) {
+  if (has_law(object)) {
+    SolidStatic& strained = strained_of(w, object);
+    strained.restore(object.strained); // whatever was sought since
+    strained.update(load);
+    object.strained = strained.answer();
+    return;
+  }
   if (object.warp) {
     WarpedStatics& warped = warped_of(w, object);
     warped.update(load);
@@ -141,6 +199,8 @@ void update_stages(World& w, Object& object, const Load& load) {
 
 std::span<const double> static_shape(Object& object) {
   Statics& statics = *object.statics;
+  if (statics.strained)
+    return statics.strained->displacement();
   if (statics.warped)
     return statics.warped->displacement();
   return statics.two_step ? statics.two_step->displacement(*statics.solver)
@@ -149,6 +209,8 @@ std::span<const double> static_shape(Object& object) {
 
 std::span<const double> static_surface(Object& object) {
   Statics& statics = *object.statics;
+  if (statics.strained)
+    return statics.strained->displacement();
   if (statics.warped)
     return statics.warped->surface_displacement();
   return statics.two_step ? statics.two_step->surface_displacement(*statics.solver)
@@ -157,6 +219,8 @@ std::span<const double> static_surface(Object& object) {
 
 std::span<const double> static_rough_surface(Object& object) {
   Statics& statics = *object.statics;
+  if (statics.strained)
+    return statics.strained->displacement();
   if (statics.warped)
     return statics.warped->surface_displacement();
   return statics.two_step ? statics.two_step->rough_surface(*statics.solver)
@@ -173,6 +237,8 @@ void verify_shape(Object& object) {
 
 std::vector<NodeVector> static_forces(const Object& object) {
   const Statics& statics = *object.statics;
+  if (statics.strained)
+    return statics.strained->holding_forces();
   if (statics.warped)
     return statics.warped->holding_forces();
   return statics.two_step ? statics.two_step->contact_forces() : statics.solver->contact_forces();

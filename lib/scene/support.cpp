@@ -42,6 +42,8 @@ bool goes(const Object& object, Way way) {
     return moves && object.matter->known && is_solid(object);
   case Way::warped:
     return object.warp;
+  case Way::strained:
+    return !moves && has_law(object);
   case Way::filled:
     return object.matter->solid.bulk.has_value();
   }

@@ -23,13 +23,14 @@ enum class Way : std::uint8_t {
   net,          ///< without tetrahedra
   solid_motion, ///< an elastodynamic solid
   warped,       ///< with large rotations
+  strained,     ///< elastostatic, with large strains
   filled        ///< a net that keeps the volume it encloses
 };
 inline constexpr std::array all_ways{
     Way::explicit_motion, Way::implicit_motion, Way::attached, Way::elastostatic,
     Way::two_step,        Way::two_step_stored, Way::whole,    Way::cut,
     Way::solid,           Way::sprung,          Way::net,      Way::solid_motion,
-    Way::warped,          Way::filled};
+    Way::warped,          Way::strained,        Way::filled};
 
 /// Feature: an action on an object.
 enum class Feature : std::uint8_t {
@@ -93,6 +94,10 @@ inline constexpr std::array gaps{
         "is elastodynamic (ela), expected an elastostatic one for two-step"},
     Gap{Way::warped, Feature::two_step, true,
         "has large rotations (rotation=warp), expected one without for two-step"},
+    Gap{Way::strained, Feature::two_step, true,
+        "has large strains (law=), expected one without for two-step"},
+    Gap{Way::strained, Feature::warp, true,
+        "has large strains (law=), expected one without for rotation=warp"},
     Gap{Way::explicit_motion, Feature::warp, true,
         "is elastodynamic (ela), expected an elastostatic one for rotation=warp"},
     Gap{Way::implicit_motion, Feature::warp, true,

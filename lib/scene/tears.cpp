@@ -31,7 +31,9 @@ Strained strained(World& w, Object& object) {
       found.u.insert(found.u.end(), {m.displacement.x, m.displacement.y, m.displacement.z});
   } else if (object.method == Method::ffe) {
     std::span<const double> u = whole_shape_in_step(w, object);
-    if (object.warped)
+    if (has_law(object))
+      found.frames = StrainFrames::elements;
+    else if (object.warped)
       u = warped_of(w, object).local_displacement();
     found.u.assign(u.begin(), u.end());
   }

@@ -59,6 +59,18 @@ std::vector<Vec3> shape_velocity(World& w, Object& object, bool afresh) {
       velocity.push_back((vector_at(after, i) - vector_at(before, i)) / object.came.duration);
   };
   try {
+    if (has_law(object)) {
+      std::optional<SolidStatic> own;
+      if (afresh)
+        own.emplace(object.model(), *law_of(object), w.context);
+      SolidStatic& strained = afresh ? *own : strained_of(w, object);
+      strained.update(load);
+      const std::span<const double> shape = strained.displacement();
+      const std::vector<double> before(shape.begin(), shape.end());
+      strained.update(now);
+      between(before, strained.displacement());
+      return velocity;
+    }
     if (object.warp) {
       std::optional<WarpedStatics> own;
       if (afresh)

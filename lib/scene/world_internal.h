@@ -76,6 +76,13 @@ inline bool is_held_altogether(const Object& object) {
                              [](const Node& node) { return node.fixed == fixed_all; });
 }
 
+/// Law of large strains that is chosen for an object or, if its model is known, that of a material.
+std::optional<SolidLaw> law_of(const Object& object);
+/// Whether its shape at rest is that of large strains, see dynamics/solid_static.h.
+inline bool has_law(const Object& object) {
+  return law_of(object).has_value();
+}
+
 /// Marks the output state and the body of an object as out of date.
 inline void touch(Object& object) {
   object.shown.valid = false;
@@ -113,6 +120,8 @@ bool feels(const World& w, Object& object, Feature feature);
 // statics.cpp: solvers of elastostatic objects, of the one-step and the two-step method
 Elastostatic& solver_of(World& w, Object& object);
 WarpedStatics& warped_of(World& w, Object& object);
+/// \pre it has a law \throw Error if the object is no solid of tetrahedra alone
+SolidStatic& strained_of(World& w, Object& object);
 ElastostaticCounts static_counts(const Object& object);
 void make_solver(const World& w, Object& object, std::shared_ptr<ComplianceSource> source);
 void update_solver(World& w, Object& object, const Load& load);

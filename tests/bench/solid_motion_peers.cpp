@@ -172,7 +172,7 @@ int main() {
     show("gewebe", body, std::array{12, 40, 100, 400, 1600, 6400},
          [&](int steps) { return ours(body, SolidLaw::corotational, steps); });
     show("gewebe Neo-Hookean", body, std::array{12, 40, 100, 400, 3200},
-         [&](int steps) { return ours(body, SolidLaw::stable_neo_hookean, steps); });
+         [&](int steps) { return ours(body, SolidLaw::hyperelastic, steps); });
     show("mujoco discrete", body, std::array{12, 40, 100, 400, 3200},
          [&](int steps) { return mujoco(path, "discrete", steps); });
     show("mujoco Euler", body, std::array{400, 800, 1600, 6400},

@@ -49,8 +49,8 @@ struct Kind {
 };
 constexpr std::array<Kind, 4> kinds = {{{SolidLaw::corotational, false},
                                         {SolidLaw::corotational, true},
-                                        {SolidLaw::stable_neo_hookean, false},
-                                        {SolidLaw::stable_neo_hookean, true}}};
+                                        {SolidLaw::hyperelastic, false},
+                                        {SolidLaw::hyperelastic, true}}};
 
 /// A box whose inner nodes, and those of its faces within them, are shifted.
 inline TetMesh some_mesh(Chance& chance, const Kind& kind) {

@@ -95,7 +95,7 @@ bool read(std::string_view text, Arguments& to) {
   if (text == "law=corotational")
     to.law = SolidLaw::corotational;
   else if (text == "law=neo-hookean")
-    to.law = SolidLaw::stable_neo_hookean;
+    to.law = SolidLaw::hyperelastic;
   else if (text == "order=1")
     to.quadratic = false;
   else if (text == "order=2")

@@ -422,7 +422,7 @@ struct Bar {
   }
   SolidMotion moving() const {
     SolidMotionOptions options;
-    options.law = SolidLaw::stable_neo_hookean;
+    options.law = SolidLaw::hyperelastic;
     options.tolerance = 1e-6;
     options.max_rounds = 100;
     SolidMotion motion(mesh, materials, options);

@@ -63,7 +63,7 @@ struct Side {
     choice.damping = damping_per_stiffness(0.5, 20);
     add(block(true), Integration::semi_implicit, choice);
     add(organ(1), Integration::implicit, {});
-    choice.law = SolidLaw::stable_neo_hookean;
+    choice.law = SolidLaw::hyperelastic;
     add(block(false), Integration::semi_implicit, choice);
     add(organ(1), Integration::semi_implicit, {});
     add(organ(1), Integration::implicit, {});

@@ -181,7 +181,7 @@ TEST_P(SolidMotionOf, ComesToRestWhereStaticsSays) {
       (void)moving.step(1, {});
     return moving.displacement();
   };
-  if (GetParam().law == SolidLaw::stable_neo_hookean) {
+  if (GetParam().law == SolidLaw::hyperelastic) {
     SolidVector load;
     load.axes = Numbers(held.size());
     for (std::size_t axis = 2; axis < load.axes.size(); axis += 3)
@@ -479,8 +479,8 @@ TEST_P(SolidMotionOf, SetStateDiscardsTheSecants) {
 INSTANTIATE_TEST_SUITE_P(Laws, SolidMotionOf,
                          testing::Values(Kind{SolidLaw::corotational, false},
                                          Kind{SolidLaw::corotational, true},
-                                         Kind{SolidLaw::stable_neo_hookean, false},
-                                         Kind{SolidLaw::stable_neo_hookean, true}),
+                                         Kind{SolidLaw::hyperelastic, false},
+                                         Kind{SolidLaw::hyperelastic, true}),
                          [](const auto& of) { return name(of.param); });
 
 /// Where a body is pressed so that it wants to buckle, its energy falls faster than straight on,

@@ -187,7 +187,7 @@ TEST_P(SolidNetOf, AChainAtRestCarriesItsWeight) {
 INSTANTIATE_TEST_SUITE_P(Kinds, SolidNetOf,
                          testing::Values(Kind{SolidLaw::corotational, false},
                                          Kind{SolidLaw::corotational, true},
-                                         Kind{SolidLaw::stable_neo_hookean, false}),
+                                         Kind{SolidLaw::hyperelastic, false}),
                          [](const auto& kind) {
                            return std::string(kind.param.law == SolidLaw::corotational
                                                   ? "corotational"

@@ -23,7 +23,8 @@ namespace gewebe {
 namespace {
 
 bool is_solid(Way way) {
-  return way == Way::solid || way == Way::warped || way == Way::solid_motion || way == Way::sprung;
+  return way == Way::solid || way == Way::warped || way == Way::strained ||
+         way == Way::solid_motion || way == Way::sprung;
 }
 
 /// All that an object is which goes on this way, in these tests, but for what it consists of.
@@ -45,6 +46,8 @@ std::vector<Way> ways_of(Way way) {
     return {Way::elastostatic, Way::whole, Way::sprung};
   case Way::warped:
     return {Way::elastostatic, Way::whole, Way::warped};
+  case Way::strained:
+    return {Way::elastostatic, Way::whole, Way::strained};
   case Way::net:
     return {Way::elastostatic, Way::whole};
   case Way::filled:
@@ -118,6 +121,8 @@ public:
     SolidChoice choice;
     if (way == Way::filled)
       choice.bulk = 1000;
+    if (way == Way::strained)
+      choice.law = SolidLaw::hyperelastic;
     scene_.add_object("o", model_, moves ? Method::ela : Method::ffe, {}, integration, choice);
     Model beside = test::organ(3);
     for (Node& n : beside.nodes)

@@ -48,7 +48,7 @@ void SceneStress::take_elements(Solid& solid, const Model& model) {
 namespace {
 
 StrainFrames frames_of(const ObjectFacts& object) {
-  if (object.moving_solid)
+  if (object.element_frames)
     return StrainFrames::elements;
   return object.warp ? StrainFrames::turning : StrainFrames::resting;
 }

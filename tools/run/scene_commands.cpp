@@ -45,17 +45,7 @@ void SceneRun::State::go_on(Step&& step) {
   answer();
 }
 
-namespace {
-
-/// Elastostatic objects have small strains.
-void require_small_strain_laws(const Model& model) {
-  for (const Material& m : model.materials)
-    if (m.law && m.law->kind != HyperelasticLaw::stable_neo_hookean)
-      throw Error("material '" + m.name + "' has the law " + law_text(*m.law) +
-                  ", which method=ffe does not serve, expected method=ela");
-}
-
-} // namespace
+namespace {} // namespace
 
 void SceneRun::State::add(const ObjectCommand& c) {
   if (options.files.check) {
@@ -64,11 +54,9 @@ void SceneRun::State::add(const ObjectCommand& c) {
       options.files.check(c.store);
   }
   ObjectSource source;
-  source.model = [this, file = c.model, method = c.method, at = line] {
+  source.model = [this, file = c.model, at = line] {
     return of_object(at, [&] {
       Model model = options.files.model(file);
-      if (method == Method::ffe)
-        require_small_strain_laws(model);
       ++counts.models;
       counts.nodes += model.nodes.size();
       return model;

@@ -1,0 +1,16 @@
+#pragma once
+// The law by which a solid of tetrahedra moves or rests under large strains.
+
+#include "integrator/solid_motion.h"
+#include "model/model.h"
+
+#include <optional>
+
+namespace gewebe {
+
+/// The law that is chosen; else that of the materials, where one of them has a law; else none.
+/// \throw Error naming a material whose law is another one than the chosen one, or the classical
+/// Neo-Hookean one, which does not serve here
+std::optional<SolidLaw> law_of(const Model& model, const std::optional<SolidLaw>& chosen);
+
+} // namespace gewebe

@@ -1,0 +1,384 @@
+#include "dynamics/solid_static.h"
+
+#include "base/error.h"
+#include "fem/model_stiffness.h"
+#include "fem/solid_model.h"
+#include "geometry/vector_at.h"
+#include "linalg/condition.h"
+#include "text/number_text.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <string>
+#include <utility>
+
+namespace gewebe {
+
+namespace {
+
+/// What is left of the way to a shape, over the displacement: a hundredth of what contact and the
+/// quickest readers of results (single precision, forces within 1e-4) resolve.
+constexpr double tolerance_at_rest = 1e-6;
+constexpr int max_rounds = 60;
+/// Of the volume, inside out: a shape with more is none, as in
+/// integrator/motion_recovery_internal.h. Coarse elements at sharp folds may be so in the shape of
+/// least energy.
+constexpr double scrambled_part = 0.01;
+/// Shortest part of the way to a load.
+constexpr double least_part = 1.0 / 64;
+/// Change of the pressure's forces by a last shape, over all of them; shapes until then, and those
+/// in a row that are no nearer to it than one before.
+constexpr double pressure_tolerance = 1e-7;
+constexpr int max_pressings = 40, max_astray = 6;
+
+/// The load on the way between two. \param places  where nodes stood under `from`
+Load part_of_way(const Model& model, const Load& from, const Load& to,
+                 std::span<const double> places, double part) {
+  if (part == 1)
+    return to;
+  Load load;
+  load.gravity = from.gravity + part * (to.gravity - from.gravity);
+  for (const auto& [node, f] : from.force)
+    load.force[node] += (1 - part) * f;
+  for (const auto& [node, f] : to.force)
+    load.force[node] += part * f;
+  for (const auto& [node, p] : from.pressure)
+    load.pressure[node].pressure += (1 - part) * p.pressure;
+  for (const auto& [node, p] : to.pressure)
+    load.pressure[node].pressure += part * p.pressure;
+  for (const auto& [node, u] : to.displacement) {
+    const Vec3 stood = vector_at(places, node) - model.nodes[node].position;
+    load.displacement[node] = stood + part * (u - stood);
+  }
+  return load;
+}
+
+} // namespace
+
+struct SolidStatic::State {
+  const Model& model;
+  Context context;
+  std::vector<double> rest; // places
+  SolidMotion engine;
+  std::vector<std::uint8_t> held; // of the engine
+  bool prepared = false;          // its factor, for what is held
+  std::optional<Vec3> weighed;
+  std::vector<double> weight;
+  std::shared_ptr<const SolidRest> answer;
+  std::vector<double> displacement; // of the answer, once it was read
+  contact::TypicalContact typical;
+  std::vector<std::uint32_t> vertices; // of the body
+  std::unique_ptr<SolidContactBody> body;
+  Load acting; // in the step with contact
+  SolidStaticCounts counts;
+
+  static SolidMotionOptions options(SolidLaw law) {
+    SolidMotionOptions options;
+    options.law = law;
+    options.tolerance = tolerance_at_rest;
+    options.max_rounds = max_rounds;
+    options.recover = false;
+    return options;
+  }
+
+  State(const Model& m, SolidLaw law, const Context& c)
+      : model(m), context(c), engine(element_mesh(m), element_materials(m), options(law), c),
+        typical(contact::typical_contact(m)) {
+    for (const Node& node : m.nodes)
+      rest.insert(rest.end(), {node.position.x, node.position.y, node.position.z});
+  }
+
+  std::vector<double> start() const { return answer ? answer->places : rest; }
+
+  // ---- loads
+
+  /// All forces on the 3 n axes, with nodes at these places.
+  std::vector<double> forces(const Load& load, std::span<const double> places) {
+    if (weighed != load.gravity) {
+      weight = weight_of(model, load.gravity);
+      weighed = load.gravity;
+    }
+    std::vector<double> all = weight;
+    const auto add = [&](std::uint32_t node, const Vec3& force) {
+      for (int a = 0; a < 3; ++a)
+        all[axis_of(node, a)] += force[a];
+    };
+    for (const auto& [node, force] : load.force)
+      add(node, force);
+    if (!load.pressure.empty())
+      press(
+          pressed_corners(load, model), 0,
+          [&](std::uint32_t node) { return vector_at(places, node); }, add);
+    return all;
+  }
+
+  /// Holds what the model and the load hold.
+  void hold(const Load& load) {
+    std::vector<std::uint8_t> now(3 * model.nodes.size());
+    for (std::uint32_t i = 0; i < model.nodes.size(); ++i)
+      for (int a = 0; a < 3; ++a)
+        now[axis_of(i, a)] = is_fixed(model, i, a) || load.displacement.contains(i) ? 1 : 0;
+    if (now != held) {
+      engine.hold(now);
+      held = std::move(now);
+      prepared = false;
+    }
+    if (prepared)
+      return;
+    require_held();
+    ++counts.factors;
+    prepared = true;
+  }
+
+  /// \throw SingularStiffness
+  void require_held() {
+    try {
+      if (engine.condition(context) <= max_condition)
+        return;
+    } catch (const NotPositiveDefinite&) {
+      // Named below.
+    }
+    StiffnessCheck check;
+    const TetMesh mesh = element_mesh(model);
+    (void)checked_factor(model,
+                         solid_stiffness(mesh,
+                                         solid_elements(mesh, element_materials(model), context),
+                                         held, context),
+                         context, check);
+    throw SingularStiffness("the model is free to move, expected more nodes that are held");
+  }
+
+  std::vector<double> targets(const Load& load) const {
+    std::vector<double> all(rest.size());
+    for (const auto& [node, u] : load.displacement)
+      for (int a = 0; a < 3; ++a)
+        all[axis_of(node, a)] = is_fixed(model, node, a) ? 0 : u[a];
+    return all;
+  }
+
+  void begin(const Load& load, std::span<const double> places) {
+    hold(load);
+    engine.restore(places, std::vector<double>(places.size()), context);
+    engine.set_load(forces(load, places));
+    if (!load.displacement.empty())
+      engine.move_held(targets(load));
+  }
+
+  // ---- shapes
+
+  /// Whether too much of the volume is inside out: a minimum of another kind than tissue has.
+  bool is_inside_out() const {
+    const auto volume = [](std::span<const double> x, const Tetrahedron& t) {
+      return tetrahedron_volume(vector_at(x, t[0]), vector_at(x, t[1]), vector_at(x, t[2]),
+                                vector_at(x, t[3]));
+    };
+    double all = 0, turned = 0;
+    for (const Tetrahedron& t : model.tetrahedra) {
+      const double own = volume(rest, t);
+      all += own;
+      turned += volume(engine.places(), t) > 0 ? 0 : own;
+    }
+    return turned > scrambled_part * all;
+  }
+
+  bool settle() {
+    const SolidStep step = engine.settle(context);
+    counts.rounds += static_cast<std::uint64_t>(step.rounds);
+    counts.factors += static_cast<std::uint64_t>(step.factorisations);
+    return step.left <= tolerance_at_rest;
+  }
+
+  /// From places to the shape under a load. \return whether it was found
+  bool find(const Load& load, std::span<const double> places) {
+    begin(load, places);
+    if (!settle())
+      return false;
+    if (load.pressure.empty())
+      return !is_inside_out();
+    // Forces of the shape before: a fixed point, by Anderson's mixing of two of them.
+    std::vector<double> pressed = forces(load, places), change, before, change_before;
+    double nearest = HUGE_VAL;
+    int astray = 0;
+    for (int k = 0; k < max_pressings; ++k) {
+      const std::vector<double> now = forces(load, engine.places());
+      double largest = 0, off = 0, across = 0, along = 0;
+      change.resize(now.size());
+      for (std::size_t axis = 0; axis < now.size(); ++axis) {
+        change[axis] = now[axis] - pressed[axis];
+        largest = std::max(largest, std::abs(now[axis]));
+        off = std::max(off, std::abs(change[axis]));
+      }
+      if (!(off > pressure_tolerance * largest))
+        return !is_inside_out();
+      astray = off < nearest ? 0 : astray + 1;
+      nearest = std::min(nearest, off);
+      if (astray > max_astray)
+        return false;
+      std::vector<double> next = now;
+      if (!before.empty()) {
+        for (std::size_t axis = 0; axis < now.size(); ++axis) {
+          const double d = change[axis] - change_before[axis];
+          across += change[axis] * d;
+          along += d * d;
+        }
+        const double share = along > 0 ? across / along : 0;
+        for (std::size_t axis = 0; axis < now.size(); ++axis)
+          next[axis] -= share * (now[axis] - (before[axis] + change_before[axis]));
+      }
+      before = std::exchange(pressed, std::move(next));
+      change_before = change;
+      engine.set_load(pressed);
+      if (!settle())
+        return false;
+    }
+    return false;
+  }
+
+  void update(const Load& load) {
+    ++counts.updates;
+    if (answer && answer->balanced && answer->load == load) {
+      ++counts.unchanged;
+      return;
+    }
+    const Load from = answer ? answer->load : Load{};
+    const std::vector<double> stood = start();
+    // What nothing loads is as it was at rest.
+    std::vector<double> places = load.empty() ? rest : stood;
+    double done = 0, part = 1;
+    while (done < 1) {
+      const double next = std::min(1.0, done + part);
+      if (find(part_of_way(model, from, load, stood, next), places)) {
+        places.assign(engine.places().begin(), engine.places().end());
+        done = next;
+        part *= 2;
+        continue;
+      }
+      part /= 4;
+      if (part < least_part)
+        throw Error("no shape at rest is found beyond " +
+                    number_text(std::round(1000 * done) / 10) +
+                    " % of the way to this load, expected a smaller one, or more steps");
+    }
+    set(load);
+  }
+
+  /// The engine's state is the answer.
+  void set(const Load& load, bool sharp = false) {
+    auto next = std::make_shared<SolidRest>();
+    next->load = load;
+    next->sharp = sharp;
+    next->places.assign(engine.places().begin(), engine.places().end());
+    next->reactions.assign(engine.reactions().begin(), engine.reactions().end());
+    take(std::move(next));
+  }
+
+  void take(std::shared_ptr<const SolidRest> next) {
+    answer = std::move(next);
+    displacement.clear();
+  }
+
+  // ---- contact
+
+  contact::ContactBody& begin_contact(const Load& load, std::vector<contact::VertexForce> last) {
+    acting = load;
+    begin(load, start());
+    engine.begin_step(HUGE_VAL, context);
+    if (answer && answer->sharp)
+      engine.sharpen();
+    if (!body) {
+      vertices = contact::model_surface(model).node;
+      body = std::make_unique<SolidContactBody>(engine, vertices, model.nodes.size());
+    }
+    body->begin(HUGE_VAL, std::move(last), typical, context);
+    if (load.pressure.empty())
+      body->follow({});
+    else
+      body->follow([this] { engine.set_load(forces(acting, engine.iterate())); });
+    return *body;
+  }
+
+  void end_contact() {
+    // What holds a displaced node bears what touches it, too.
+    std::vector<double> touching(body->forces().begin(), body->forces().end());
+    for (std::size_t axis = 0; axis < touching.size(); ++axis)
+      if (held[axis] != 0)
+        touching[axis] = 0;
+    const bool sharp = engine.is_sharp();
+    const SolidStep step = engine.end_step(touching, context);
+    counts.rounds += static_cast<std::uint64_t>(step.rounds);
+    counts.factors += static_cast<std::uint64_t>(step.factorisations);
+    for (std::uint32_t node = 0; node < model.nodes.size(); ++node)
+      if (const Vec3 f = vector_at(std::span<const double>(touching), node); f != Vec3{})
+        acting.force[node] += f;
+    set(acting, sharp);
+  }
+};
+
+SolidStatic::SolidStatic(const Model& model, SolidLaw law, const Context& context)
+    : state_(std::make_unique<State>(model, law, context)) {}
+SolidStatic::~SolidStatic() = default;
+SolidStatic::SolidStatic(SolidStatic&&) noexcept = default;
+
+void SolidStatic::update(const Load& load) {
+  state_->update(load);
+}
+
+void SolidStatic::prepare(const Load& load) {
+  state_->hold(load);
+}
+
+std::shared_ptr<const SolidRest> SolidStatic::answer() const noexcept {
+  return state_->answer;
+}
+
+void SolidStatic::restore(std::shared_ptr<const SolidRest> answer) {
+  if (answer != state_->answer)
+    state_->take(std::move(answer));
+}
+
+std::span<const double> SolidStatic::displacement() {
+  State& s = *state_;
+  if (!s.displacement.empty())
+    return s.displacement;
+  ++s.counts.shapes;
+  s.displacement.assign(s.rest.size(), 0);
+  if (!s.answer)
+    return s.displacement;
+  for (std::size_t axis = 0; axis < s.rest.size(); ++axis)
+    s.displacement[axis] = s.answer->places[axis] - s.rest[axis];
+  for (const auto& [node, u] : s.answer->load.displacement)
+    for (int a = 0; a < 3; ++a)
+      s.displacement[axis_of(node, a)] = is_fixed(s.model, node, a) ? 0 : u[a];
+  return s.displacement;
+}
+
+std::vector<NodeVector> SolidStatic::holding_forces() const {
+  std::vector<NodeVector> forces;
+  const State& s = *state_;
+  if (!s.answer || s.answer->reactions.empty())
+    return forces;
+  for (const auto& entry : s.answer->load.displacement) {
+    NodeVector force{entry.first, {}};
+    for (int a = 0; a < 3; ++a)
+      if (!is_fixed(s.model, entry.first, a))
+        force.value[a] = s.answer->reactions[axis_of(entry.first, a)];
+    forces.push_back(force);
+  }
+  return forces;
+}
+
+contact::ContactBody& SolidStatic::begin_contact(const Load& load,
+                                                 std::vector<contact::VertexForce> last) {
+  return state_->begin_contact(load, std::move(last));
+}
+
+void SolidStatic::end_contact() {
+  state_->end_contact();
+}
+
+SolidStaticCounts SolidStatic::counts() const noexcept {
+  return state_->counts;
+}
+
+} // namespace gewebe
