@@ -115,6 +115,8 @@ void expect_newtons_shapes(const Model& model, bool near = false) {
   for (const std::uint32_t node : end)
     moved.displacement[node] = {14, 0, -12};
   for (const Load& load : {heavy, moved}) {
+    if (near && !model.middles.empty() && !load.displacement.empty())
+      continue; // it takes a minute
     SolidStatic body(model, SolidLaw::hyperelastic, test::one_thread());
     ASSERT_NO_THROW(body.update(load));
     const Reference expected(model, load, near ? body.displacement() : std::span<const double>());
@@ -140,14 +142,11 @@ void expect_newtons_shapes(const Model& model, bool near = false) {
 TEST_P(SolidStaticOf, LargeShapesAreThoseOfNewtonsMethod) {
   Model model = bar(2e4, GetParam());
   expect_newtons_shapes(model);
-  if (GetParam() == 2) { // the others take long there
-    model.materials[0].law = parse_law("yeoh:c20=0.1");
-    expect_newtons_shapes(model, true);
-    return;
-  }
   for (const char* const law : {"yeoh:c20=0.1", "mooney-rivlin:c01=0.2", "ogden:alpha1=4"}) {
     SCOPED_TRACE(law);
     model.materials[0].law = parse_law(law);
+    if (GetParam() == 2 && model.materials[0].law->kind != HyperelasticLaw::yeoh)
+      continue; // takes long
     expect_newtons_shapes(model, true);
     // Almost all of a load is taken away.
     SolidStatic body(model, SolidLaw::hyperelastic, test::one_thread());
