@@ -70,8 +70,7 @@ What parse_object(Words& in) {
     else if (word == "rotation=warp" && !c.warp)
       c.warp = true;
     else if ((word == "law=corotational" || word == "law=neo-hookean") && !c.solid.law)
-      c.solid.law =
-          word == "law=corotational" ? SolidLaw::corotational : SolidLaw::hyperelastic;
+      c.solid.law = word == "law=corotational" ? SolidLaw::corotational : SolidLaw::hyperelastic;
     else if (word.starts_with("damping=") && !c.solid.damping)
       c.solid.damping = parse_damping(in, std::string_view(word).substr(8));
     else if (word.starts_with("bulk=") && !c.solid.bulk)

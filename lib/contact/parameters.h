@@ -55,8 +55,8 @@ struct Parameters {
   /// Renewals of friction's lag in one round where forces all but balance, then those between
   /// solutions.
   int max_way_lags = 100, max_lags = 30;
-  int whole_lags = 4;         ///< behind so many of each, normal forces take half of their changes
-  int max_searches = 5;       ///< broad phases of one step, each with twice the margin
+  int whole_lags = 4;        ///< behind so many of each, normal forces take half of their changes
+  int max_searches = 5;      ///< broad phases of one step, each with twice the margin
   int max_way_searches = 40; ///< ... where vertices leave what was searched
 
   // ---- tolerances
