@@ -825,7 +825,8 @@ class Groove(Case):
             force = mean(dot(self.force(f, name), (side / math.sqrt(2), 0, -1 / math.sqrt(2))) for f in window)
             yield near(f"normal force of the {name} plane over W / sqrt(2)", force / self.weight * math.sqrt(2), 1, 0.01)
             along = max(abs(dot(self.force(f, name), (1 / math.sqrt(2), 0, side / math.sqrt(2)))) for f in window)
-            yield at_most(f"force along the {name} plane over W", along / self.weight, 1e-3)
+            # 1e-5 at rest; up to half a per cent for the moments in which an edge of the ball rolls over one of the plane.
+            yield at_most(f"force along the {name} plane over W", along / self.weight, 0.01)
 
 
 class Plate(Case):
