@@ -392,14 +392,16 @@ private:
       }
   }
 
-  /// Raises eigenvalues to a thousandth of the stiffness that mu gives.
+  /// Takes the sizes of eigenvalues, at least a thousandth of the stiffness that mu gives: steps of
+  /// Newton's method along negative ones are as long as along positive ones.
   void make_positive() {
     double least = 0;
     for (const Part& q : parts_)
       least += 1e-3 * mu_ * q.weight * q.square;
     const Eigen::SelfAdjointEigenSolver<Matrix3> solver(second_);
     if (!(solver.eigenvalues()[0] >= least))
-      second_ = solver.eigenvectors() * solver.eigenvalues().cwiseMax(least).asDiagonal() *
+      second_ = solver.eigenvectors() *
+                solver.eigenvalues().cwiseAbs().cwiseMax(least).asDiagonal() *
                 solver.eigenvectors().transpose();
   }
 
