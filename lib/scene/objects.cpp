@@ -23,15 +23,30 @@ std::optional<SolidLaw> law_of(const Object& object) {
   return object.matter->known ? gewebe::law_of(object.model(), chosen) : chosen;
 }
 
+namespace {
+
+/// Laws of materials are known only when the model is read. \throw Error naming the object
+void require_law_served(const Object& object) {
+  std::optional<SolidLaw> law;
+  try {
+    law = gewebe::law_of(object.model(), object.matter->solid.law);
+  } catch (const Error& error) {
+    throw ObjectError("object " + object.name() + ": " + error.what());
+  }
+  if (!law || object.method != Method::ffe || !(object.warp || object.stages.options))
+    return;
+  throw ObjectError("object " + object.name() + " has a law of large strains, which " +
+                    (object.warp ? "rotation=warp" : "two-step") + " does not serve, expected no " +
+                    (object.warp ? "rotation=warp" : "two-step") + " or a model without laws");
+}
+
+} // namespace
+
 void need_model(Object& object) {
   if (object.matter->known)
     return;
   object.matter->model = std::make_shared<const Model>(object.matter->source.model());
-  try {
-    (void)gewebe::law_of(object.model(), object.matter->solid.law);
-  } catch (const Error& error) {
-    throw Error("object " + object.name() + ": " + error.what());
-  }
+  require_law_served(object);
   object.shown.displacement.replace().assign(3 * object.model().nodes.size(), 0);
   object.matter->known = true;
 }

@@ -96,12 +96,15 @@ public:
   using Error::Error;
 };
 
-/// Runs `work`; adds object and time to an Error that it throws.
+/// Runs `work`; adds object and time to an Error that it throws, unless it names the object
+/// already.
 template <class Work>
 void at_object(const World& w, const Object& object, Work&& work) {
   try {
     work();
   } catch (const Cancelled&) {
+    throw;
+  } catch (const ObjectError&) {
     throw;
   } catch (const Error& error) {
     throw ObjectError("object " + object.name() + " at " + number_text(w.now.clock.time) +

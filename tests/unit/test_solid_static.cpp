@@ -15,6 +15,7 @@
 #include "scene/simulation.h"
 #include "sim_models.h"
 #include "statics/elastostatic.h"
+#include "tests/unit/pressed_bar.h"
 #include "tests/unit/relative_difference.h"
 #include "tet_fixtures.h"
 
@@ -287,38 +288,14 @@ TEST(SolidStatic, AnAnswerIsAValue) {
   EXPECT_EQ(shown(other, {0, 9810, -9810}), second);
 }
 
-/// A scene with a bar whose end a sphere presses down.
-class Pressed {
+class Pressed : public test::PressedBar {
 public:
   explicit Pressed(SolidLaw of = SolidLaw::hyperelastic, int threads = 1)
-      : scene_(context(threads), {.warn = [](const std::string&) {}, .guard = true}) {
-    scene_.add_object("bar", model_, Method::ffe, {}, Integration::semi_implicit, law(of));
-    SetInstrument ball;
-    ball.name = "ball";
-    ball.shape.radius = 6;
-    ball.pose.place = {36, 4, 15};
-    scene_.apply(ball);
-    scene_.step(0.01);
-  }
-  static Context context(int threads) {
-    Context context;
-    context.threads = threads;
-    return context;
-  }
-  void press(double z) {
-    scene_.apply(MoveInstrument{0, {36, 4, z}, {}, 0});
-    scene_.step(0.01);
-  }
+      : test::PressedBar(bar(), law(of), false, threads) {}
   std::vector<double> shape() const {
-    const auto u = scene_.displacement(0);
+    const auto u = scene().displacement(0);
     return {u.begin(), u.end()};
   }
-  const Model& model() const { return model_; }
-  Simulation& scene() { return scene_; }
-
-private:
-  Model model_ = bar();
-  Simulation scene_;
 };
 
 TEST(SolidStatic, AnInstrumentPressesTheBarDown) {

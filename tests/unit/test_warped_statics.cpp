@@ -13,6 +13,7 @@
 #include "sim_models.h"
 #include "statics/elastostatic.h"
 #include "statics/warped_statics.h"
+#include "tests/unit/pressed_bar.h"
 #include "tests/unit/relative_difference.h"
 #include "tet_fixtures.h"
 
@@ -203,40 +204,14 @@ TEST(WarpedStatics, StressesTurnWithTheirFrames) {
               1e-11);
 }
 
-/// A scene with a bar whose end a sphere presses down.
-class Pressed {
+class Pressed : public test::PressedBar {
 public:
   explicit Pressed(bool warp = true, int threads = 1)
-      : scene_(context(threads), {.warn = [](const std::string&) {}, .guard = true}) {
-    scene_.add_object("bar", model_, Method::ffe);
-    if (warp)
-      scene_.apply(SetWarp{0});
-    SetInstrument ball;
-    ball.name = "ball";
-    ball.shape.radius = 6;
-    ball.pose.place = {36, 4, 15};
-    scene_.apply(ball);
-    scene_.step(0.01);
-  }
-  static Context context(int threads) {
-    Context context;
-    context.threads = threads;
-    return context;
-  }
-  void press(double z) {
-    scene_.apply(MoveInstrument{0, {36, 4, z}, {}, 0});
-    scene_.step(0.01);
-  }
+      : test::PressedBar(bar(), {}, warp, threads) {}
   std::vector<double> shape() const {
-    const auto u = scene_.surface_displacement(0);
+    const auto u = scene().surface_displacement(0);
     return {u.begin(), u.end()};
   }
-  const Model& model() const { return model_; }
-  Simulation& scene() { return scene_; }
-
-private:
-  Model model_ = bar();
-  Simulation scene_;
 };
 
 TEST(WarpedStatics, AnInstrumentPressesTheBarDown) {
