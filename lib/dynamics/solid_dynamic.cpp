@@ -1,7 +1,7 @@
 #include "dynamics/solid_dynamic.h"
 
-#include "dynamics/solid_law.h"
 #include "base/error.h"
+#include "dynamics/solid_law.h"
 #include "dynamics/spring_force.h"
 #include "fem/assembly.h"
 #include "fem/model_stiffness.h"
