@@ -68,6 +68,7 @@ ModelSurface model_surface(const Model& model) {
   }
   for (const Triangle& t : model.triangles)
     all.surface.triangles.push_back({vertex[t[0]], vertex[t[1]], vertex[t[2]]});
+  all.typical = typical_contact(model);
   return all;
 }
 

@@ -88,7 +88,8 @@ private:
     return energy_.energy(x);
   }
   double renew_gradient() {
-    std::ranges::fill(gradient_, Vec3{});
+    for (const std::uint32_t v : candidates_.vertices()) // all that pairs have
+      gradient_[v] = {};
     return energy_.add_gradient(at_, gradient_);
   }
   bool solve_system(CondensedSystem& system, HessianMode mode) {

@@ -153,7 +153,7 @@ contact::ContactBody& StaticMember::begin(double /*from*/, double to, const Cont
     return *body;
   }
   StaticContactState state{&object.model(),
-                           &surface_.node,
+                           &surface_,
                            &load_,
                            *object.shown.displacement,
                            std::move(last),

@@ -21,13 +21,13 @@ constexpr double shape_room = 0.1;
 } // namespace
 
 StaticContactBody::StaticContactBody(StaticContactState state)
-    : state_(std::move(state)), typical_(contact::typical_contact(*state_.model)),
+    : state_(std::move(state)),
       displacement_(state_.displacement.begin(), state_.displacement.end()) {}
 
 void StaticContactBody::positions(std::span<Vec3> x) {
   const std::span<const double> u = displacement_;
   for (std::size_t k = 0; k < x.size(); ++k) {
-    const std::uint32_t node = (*state_.vertices)[k];
+    const std::uint32_t node = state_.surface->node[k];
     x[k] = state_.model->nodes[node].position + vector_at(u, node);
   }
 }
@@ -35,7 +35,7 @@ void StaticContactBody::positions(std::span<Vec3> x) {
 void StaticContactBody::act(std::span<const VertexForce> forces) {
   acting_ = *state_.load;
   for (const VertexForce& f : forces)
-    if (const std::uint32_t node = (*state_.vertices)[f.vertex];
+    if (const std::uint32_t node = state_.surface->node[f.vertex];
         !acting_.displacement.contains(node))
       acting_.force[node] += f.force;
 }
@@ -58,13 +58,13 @@ double StaticContactBody::linearise(std::span<const VertexForce> forces, std::sp
     most = std::max(most, std::abs(step_[k]));
   }
   for (std::size_t k = 0; k < step.size(); ++k)
-    step[k] = vector_at(std::span<const double>(step_), (*state_.vertices)[k]);
-  return typical_.force * most;
+    step[k] = vector_at(std::span<const double>(step_), state_.surface->node[k]);
+  return state_.surface->typical.force * most;
 }
 
 void StaticContactBody::compliance(std::uint32_t vertex, std::span<const std::uint32_t> rows,
                                    std::span<Block3> blocks) {
-  const std::uint32_t node = (*state_.vertices)[vertex];
+  const std::uint32_t node = state_.surface->node[vertex];
   std::ranges::fill(blocks, Block3{});
   if (!is_linear() && !std::ranges::equal(rows, rows_))
     rows_.assign(rows.begin(), rows.end());
@@ -73,7 +73,8 @@ void StaticContactBody::compliance(std::uint32_t vertex, std::span<const std::ui
   std::vector<std::uint32_t> nodes;
   std::vector<std::size_t> place;
   for (std::size_t k = 0; k < rows.size(); ++k)
-    if (const std::uint32_t row = (*state_.vertices)[rows[k]]; !load().displacement.contains(row)) {
+    if (const std::uint32_t row = state_.surface->node[rows[k]];
+        !load().displacement.contains(row)) {
       nodes.push_back(row);
       place.push_back(k);
     }
@@ -106,7 +107,7 @@ void StaticContactBody::move(double share, std::span<const VertexForce> forces) 
     for (std::size_t k = 0; k < rows_.size(); ++k) {
       const Block3& b = blocks[k];
       for (std::size_t a = 0; a < 3; ++a)
-        displacement_[axis_of((*state_.vertices)[rows_[k]], static_cast<int>(a))] +=
+        displacement_[axis_of(state_.surface->node[rows_[k]], static_cast<int>(a))] +=
             b[3 * a] * f.x + b[3 * a + 1] * f.y + b[3 * a + 2] * f.z;
     }
   }

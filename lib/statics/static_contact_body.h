@@ -21,10 +21,10 @@ namespace gewebe {
 /// Displacement of an object, and forces on it.
 struct StaticContactState {
   const Model* model = nullptr;
-  const std::vector<std::uint32_t>* vertices = nullptr; ///< nodes of the collision surface
-  const Load* load = nullptr;                           ///< at the end of the step
-  std::span<const double> displacement{};               ///< at its beginning, of the surface
-  std::vector<contact::VertexForce> forces{};           ///< contact forces at its beginning
+  const contact::ModelSurface* surface = nullptr;
+  const Load* load = nullptr;                 ///< at the end of the step
+  std::span<const double> displacement{};     ///< at its beginning, of the surface
+  std::vector<contact::VertexForce> forces{}; ///< contact forces at its beginning
   /// Throws if a shape before contact is so far off that no contact could be found.
   std::function<void(std::span<const double>)> require_shape{};
 };
@@ -36,7 +36,7 @@ class StaticContactBody : public contact::ContactBody {
 public:
   explicit StaticContactBody(StaticContactState state);
 
-  std::size_t vertex_count() const override { return state_.vertices->size(); }
+  std::size_t vertex_count() const override { return state_.surface->node.size(); }
   void positions(std::span<Vec3> x) override;
   double linearise(std::span<const contact::VertexForce> forces, std::span<Vec3> step) override;
   std::vector<contact::VertexForce> last_forces() const override { return state_.forces; }
@@ -45,8 +45,8 @@ public:
   void move(double share, std::span<const contact::VertexForce> forces) override;
   bool keep_momentum(double room) override;
   bool is_led() const override { return !state_.load->displacement.empty(); }
-  double typical_force() const override { return typical_.force; }
-  double vertex_stiffness() const override { return typical_.stiffness; }
+  double typical_force() const override { return state_.surface->typical.force; }
+  double vertex_stiffness() const override { return state_.surface->typical.stiffness; }
 
   /// Displacement of the surface's nodes.
   std::span<const double> displacement() const { return displacement_; }
@@ -68,7 +68,6 @@ private:
   void act(std::span<const contact::VertexForce> forces);
 
   StaticContactState state_;
-  contact::TypicalContact typical_;
   Load acting_;
   std::vector<double> displacement_, begin_, step_;
   // Of the quadratic model.
