@@ -73,6 +73,7 @@ void work(cli::Run& run, const RunArguments& in) {
   options.shared = shared.get();
   options.measure = run.stats_wanted();
   options.measure_error = in.verify;
+  options.estimate = in.estimate;
   options.tolerance = in.tolerance;
   options.gone = [&] { return answers.unheard(); };
   const bool shared_screen = progress && spoken && ::isatty(1) != 0;

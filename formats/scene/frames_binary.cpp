@@ -66,7 +66,7 @@ std::string text_frame(FrameKind kind, std::uint64_t step, std::string_view text
 } // namespace
 
 std::string binary_answer(const Simulation& simulation, std::uint64_t step,
-                          std::span<const StressAnswer> stresses) {
+                          const AnswerFields& fields) {
   std::string bytes;
   for (const MethodJump& jump : simulation.news().jumps) {
     append_head(bytes, {FrameKind::jump, static_cast<std::uint32_t>(jump.object), step, 1});
@@ -103,7 +103,7 @@ std::string binary_answer(const Simulation& simulation, std::uint64_t step,
     for (std::size_t k = 0; k < count; ++k)
       append_single(bytes, nodes[k].position + vector_at(u, k));
   }
-  for (const StressAnswer& of : stresses) {
+  for (const StressAnswer& of : fields.stresses) {
     const auto object = static_cast<std::uint32_t>(of.object);
     append_head(bytes, {FrameKind::nodes, object, step, of.nodes.size()});
     for (const std::uint32_t node : of.nodes)
@@ -114,6 +114,14 @@ std::string binary_answer(const Simulation& simulation, std::uint64_t step,
         append_single(bytes, value);
       append_single(bytes, von_mises(of.stress[node]));
     }
+  }
+  for (const EstimateAnswer& of : fields.estimates) {
+    append_head(bytes, {FrameKind::estimate, static_cast<std::uint32_t>(of.object), step,
+                        of.error ? 4U : 0U});
+    if (of.error)
+      for (const double value :
+           {of.error->relative, of.error->force, of.error->displacement, of.error->stress})
+        append_single(bytes, value);
   }
   for (std::uint32_t k = 0;
        simulation.settings().emits.instruments && k < simulation.instrument_count(); ++k) {

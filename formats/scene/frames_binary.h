@@ -31,6 +31,7 @@ enum class FrameKind : std::uint32_t {
       12,    ///< 7 float32 of each node: the tensor, von Mises's stress; those of the frame before
   ok = 13,   ///< one uint64: the line of this number is done
   told = 14, ///< text, padded with zero bytes: answer to a question
+  estimate = 15, ///< 4 float32: relative error, of force, displacement and stress; or nothing
 };
 
 /// The head of each frame, without gaps: 28 bytes.
@@ -42,11 +43,11 @@ struct FrameHead {
 };
 
 /// The frames that answer a step: jump, then what cutting did, triangles, then nodes and forces,
-/// then shapes of all objects, then nodes and stresses, then instruments, as far as the scene emits
-/// them, then done. \pre as text_answer
-/// \throw Error where a number does not fit single precision
+/// then shapes of all objects, then nodes and stresses, then estimates, then instruments, as far as
+/// the scene emits them, then done. \pre as text_answer \throw Error where a number does not fit
+/// single precision
 std::string binary_answer(const Simulation& simulation, std::uint64_t step,
-                          std::span<const StressAnswer> stresses = {});
+                          const AnswerFields& fields = {});
 
 /// The frame that answers sync: done alone.
 std::string binary_sync(const Simulation& simulation, std::uint64_t step);

@@ -81,7 +81,7 @@ bool topology_changed(const Simulation& simulation, std::size_t object) {
 }
 
 std::string text_answer(const Simulation& simulation, std::uint64_t step,
-                        std::span<const StressAnswer> stresses) {
+                        const AnswerFields& fields) {
   std::string text = "step " + std::to_string(step) + " ";
   append(text, simulation.time());
   text += '\n';
@@ -122,7 +122,7 @@ std::string text_answer(const Simulation& simulation, std::uint64_t step,
     for (std::size_t k = 0; k < count; ++k)
       append(text, nodes[k].position + vector_at(u, k), '\n');
   }
-  for (const StressAnswer& of : stresses) {
+  for (const StressAnswer& of : fields.stresses) {
     text += "stress " + simulation.object(of.object).name + " " + std::to_string(of.nodes.size()) +
             "\n";
     for (const std::uint32_t node : of.nodes) {
@@ -135,6 +135,14 @@ std::string text_answer(const Simulation& simulation, std::uint64_t step,
       append(text, von_mises(of.stress[node]));
       text += '\n';
     }
+  }
+  for (const EstimateAnswer& of : fields.estimates) {
+    text += "estimate " + simulation.object(of.object).name;
+    if (const std::optional<DiscretisationError>& e = of.error)
+      append_numbers(text, {e->relative, e->force, e->displacement, e->stress});
+    else
+      text += " none";
+    text += '\n';
   }
   if (simulation.settings().emits.instruments)
     text += instrument_lines(simulation, [](std::string& line, const InstrumentReport& report) {

@@ -8,6 +8,7 @@
 #include <cstdint>
 #include <functional>
 #include <initializer_list>
+#include <optional>
 #include <span>
 #include <string>
 #include <string_view>
@@ -26,11 +27,31 @@ struct StressAnswer {
   std::span<const SymmetricBlock> stress; ///< of all nodes of the object, Pa
 };
 
+/// What mesh and order of the elements cause, estimated: gewebe_serve(5).
+struct DiscretisationError {
+  double relative = 0;     ///< of the energy, and so of forces and displacements
+  double force = 0;        ///< of the sum of forces at displaced and touched nodes, 1e-6 N
+  double displacement = 0; ///< of the largest displacement of another node, mm
+  double stress = 0;       ///< at the node of the largest von Mises stress, Pa
+};
+
+/// Answer of --estimate for an object; none where errors can't be estimated.
+struct EstimateAnswer {
+  std::size_t object = 0;
+  std::optional<DiscretisationError> error{};
+};
+
+/// What answers have beside the state of the simulation.
+struct AnswerFields {
+  std::span<const StressAnswer> stresses{};
+  std::span<const EstimateAnswer> estimates{};
+};
+
 /// The answer to a step, from "step K T" to "done": jumps of objects that changed their method,
 /// what cutting did, forces, shapes and stresses as far as the scene emits them. \pre the models of
 /// all objects are known where shapes are emitted
 std::string text_answer(const Simulation& simulation, std::uint64_t step,
-                        std::span<const StressAnswer> stresses = {});
+                        const AnswerFields& fields = {});
 
 /// "instruments n", then for each that is there a line: its name and what `tell` adds to it.
 std::string

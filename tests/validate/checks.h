@@ -85,6 +85,7 @@ Figure figure_of(const test::SolidCase& c);
 Section constant_strain();
 Section manufactured();
 Section benchmarks();
+Section error_estimates();
 Section hertz();
 Section contact_potentials();
 Section sliding();

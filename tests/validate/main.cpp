@@ -20,10 +20,11 @@
 
 int main(int count, char** words) {
   using namespace gewebe::validate;
-  const std::array<std::pair<std::string, Section (*)()>, 12> all{
+  const std::array<std::pair<std::string, Section (*)()>, 13> all{
       {{"patch", constant_strain},
        {"order", manufactured},
        {"benchmarks", benchmarks},
+       {"estimates", error_estimates},
        {"contact", hertz},
        {"potentials", contact_potentials},
        {"sliding", sliding},

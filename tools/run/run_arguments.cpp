@@ -22,6 +22,7 @@ void RunArguments::declare(cli::Program& p) {
            "error allowed in shapes, relative to their largest displacement")
       .range(0, 0.1);
   p.flag("--verify", verify, "measure the error of every shape and fail if one is too large");
+  p.flag("--estimate", estimate, "answer the errors that meshes of solids cause");
   p.option("--rate", rate, "HZ", "steps per second that you need; late ones are counted")
       .positive();
   p.option("--latencies", latencies, "FILE", "write the time to answer each step, as CSV");

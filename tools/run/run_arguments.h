@@ -12,7 +12,7 @@ namespace gewebe {
 struct RunArguments {
   std::string scene = "-";
   bool serve = false, acknowledge = false, awake = false, binary = false, verify = false;
-  bool no_partial = false;
+  bool no_partial = false, estimate = false;
   std::optional<double> rate;
   double tolerance = 0;
   std::string listen, shapes, events, record, latencies, recover;

@@ -99,13 +99,17 @@ void SceneRun::State::answer() {
       [this](const std::string& text) { warn(text); },
       [this](const std::string& text) { distrust(text); });
   stress.find(simulation, gravity);
+  const std::vector<EstimateAnswer> estimated =
+      options.estimate ? estimates.find(simulation, gravity) : std::vector<EstimateAnswer>{};
   answered_gravity = gravity;
   if (shared) // before the reader of the answer looks
     shared->frame(simulation, steps);
   if (options.reply)
     deliver([&] {
-      options.reply(options.binary ? binary_answer(simulation, steps, stress.answers())
-                                   : text_answer(simulation, steps, stress.answers()));
+      const std::vector<StressAnswer> stresses = stress.answers();
+      const AnswerFields fields{stresses, estimated};
+      options.reply(options.binary ? binary_answer(simulation, steps, fields)
+                                   : text_answer(simulation, steps, fields));
     });
   if (options.events != nullptr) {
     for (const Cutting& c : simulation.news().cuttings)

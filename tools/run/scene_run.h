@@ -68,6 +68,7 @@ struct SceneOptions {
   std::function<void(double time, std::uint64_t frames)> progress{};
   bool measure = false;       ///< digest and largest displacement
   bool measure_error = false; ///< of every shape
+  bool estimate = false;      ///< answers have errors that meshes cause
   double tolerance = 0;       ///< see ElastostaticOptions
 };
 

@@ -4,6 +4,7 @@
 #include "base/digest.h"
 #include "base/error.h"
 #include "formats/scene/command.h"
+#include "tools/results/scene_estimate.h"
 #include "tools/results/scene_result.h"
 #include "tools/results/scene_shapes.h"
 #include "tools/results/scene_stress.h"
@@ -49,6 +50,7 @@ struct SceneRun::State {
   Error first_error{""};
   SceneChecks checks;
   SceneStress stress;
+  SceneEstimates estimates;
   Vec3 gravity, answered_gravity; ///< now, and at the last answer or accepted line
   std::optional<SceneResult> result;
   std::optional<SceneShapes> shared;
