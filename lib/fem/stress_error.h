@@ -9,9 +9,10 @@
 // material has its own fit. The difference d = recovered - element stress approximates the error of
 // the stress, and
 //
-//   ||e||² = a(e, e) ≈ ∫ d : C⁻¹ : d
+//   ||e||² = a(e, e) ≈ s ∫ d : C⁻¹ : d
 //
-// that of the energy (Zienkiewicz, Zhu, Int. J. Numer. Methods Eng. 24, 1987). Energies are forces:
+// that of the energy (Zienkiewicz, Zhu, Int. J. Numer. Methods Eng. 24, 1987), with a factor s for
+// bodies that are clamped or pressed somewhere, as almost all are. Energies are forces:
 // with displacements given at some nodes, r their reactions and u the given displacements, the
 // elements have r·u = a(u, u) + ||e||²; with given forces f, they have f·u = a(u, u) - ||e||².
 
