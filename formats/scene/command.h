@@ -66,7 +66,7 @@ struct QueryCommand {
 struct EndCommand {};
 
 struct Command {
-  std::optional<double> at; ///< when; absent: now. For changes other than renew
+  std::optional<double> at; ///< when; absent: now
   bool every = false;       ///< at every multiple of it
   std::variant<ObjectCommand, ChangeCommand, EmitModelCommand, EmitStressCommand, StepCommand,
                RunCommand, SyncCommand, QueryCommand, EndCommand>

@@ -380,10 +380,6 @@ What parse_restore(Words& in) {
   return ChangeCommand{.change = Restore{}, .object = in.name()};
 }
 
-What parse_renew(Words& in) {
-  return ChangeCommand{.change = Renew{}, .object = in.name()};
-}
-
 What parse_prepare(Words& in) {
   ChangeCommand c;
   c.object = in.name();
@@ -408,8 +404,8 @@ struct Verb {
   std::function<What(Words&)> parse;
 };
 
-const std::array<Verb, 31>& verbs() {
-  static const std::array<Verb, 31> all{{
+const std::array<Verb, 30>& verbs() {
+  static const std::array<Verb, 30> all{{
       {"object",
        "object NAME MODEL.ela [store=FILE.h5] [method=ffe|ela] [integration=implicit|auto] "
        "[rotation=warp] [law=corotational|neo-hookean] [damping=RATIO@HZ] [tolerance=E] "
@@ -454,7 +450,6 @@ const std::array<Verb, 31>& verbs() {
        true, parse_emit},
       {"step", "step [dt], dt 0 or more", false, parse_step},
       {"run", "run UNTIL every DT", false, parse_run},
-      {"renew", "renew NAME", false, parse_renew},
       {"prepare", "prepare NAME [contact [NODES]|cut]", false, parse_prepare},
       {"sync", "sync", false, parse_sync},
       {"end", "end", false, parse_end},

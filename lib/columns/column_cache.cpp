@@ -53,7 +53,10 @@ struct ColumnCache::Term {
 ColumnCache::ColumnCache(std::size_t nodes, const ColumnSource* source, ColumnSolve solve,
                          double bytes, bool bounded)
     : axes_(3 * nodes), source_(source), solve_(std::move(solve)), bounded_(bounded),
-      wide_(3 * axes_), narrow_(3 * axes_) {
+      wide_(std::make_shared<SlotPool<double>>(3 * axes_)),
+      narrow_(std::make_shared<SlotPool<float>>(3 * axes_)) {
+  now_.columns.write().resize(nodes);
+  now_.used.write().resize(nodes);
   const bool single = source_ != nullptr && source_->single();
   const double each = (single ? 12.0 : 24.0) * static_cast<double>(axes_);
   capacity_ = std::max<std::size_t>(2, static_cast<std::size_t>(bytes / each));
@@ -66,46 +69,40 @@ bool ColumnCache::stored(std::uint32_t node) const {
 
 /// Makes room for new columns. \param count  of them; some may have been prepared
 void ColumnCache::make_room(std::size_t count) {
-  while (!ahead_.empty() && kept_.size() + count + ahead_.size() > capacity_) {
-    wide_.give_back(ahead_.begin()->second);
-    ahead_.erase(ahead_.begin());
-  }
-  if (kept_.size() + count <= capacity_)
+  while (!now_.ahead->empty() && now_.count + count + now_.ahead->size() > capacity_)
+    now_.ahead.write().erase(now_.ahead->begin());
+  if (now_.count + count <= capacity_)
     return;
   std::vector<std::pair<std::uint64_t, std::uint32_t>> old;
-  old.reserve(kept_.size());
-  for (const auto& [node, columns] : kept_)
-    old.emplace_back(columns.used, node);
+  old.reserve(now_.count);
+  for (std::uint32_t node = 0; node < now_.columns->size(); ++node)
+    if (resident(node))
+      old.emplace_back((*now_.used)[node], node);
   std::sort(old.begin(), old.end());
-  for (std::size_t k = 0; kept_.size() + count > capacity_ && k < old.size(); ++k)
+  for (std::size_t k = 0; now_.count + count > capacity_ && k < old.size(); ++k)
     drop(old[k].second);
 }
 
-ColumnCache::Columns& ColumnCache::fresh(std::uint32_t node, bool single) {
-  Columns& columns = kept_[node];
-  if (single)
-    columns.narrow = narrow_.take();
-  else
-    columns.wide = wide_.take();
-  columns.used = clock_;
-  return columns;
+void ColumnCache::put(std::uint32_t node, Columns columns) {
+  if (bounded_)
+    columns.bound = columns.wide == nullptr ? bounds_of(columns.narrow.get(), axes_)
+                                            : bounds_of(columns.wide.get(), axes_);
+  now_.columns.write()[node] = std::make_shared<const Columns>(std::move(columns));
+  now_.used.write()[node] = now_.clock;
+  ++now_.count;
 }
 
 void ColumnCache::drop(std::uint32_t node) {
-  const auto found = kept_.find(node);
-  if (found->second.wide != nullptr)
-    wide_.give_back(found->second.wide);
-  if (found->second.narrow != nullptr)
-    narrow_.give_back(found->second.narrow);
-  kept_.erase(found);
+  now_.columns.write()[node] = nullptr;
+  --now_.count;
 }
 
 void ColumnCache::need(std::span<const std::uint32_t> nodes) {
-  ++clock_;
+  ++now_.clock;
   std::vector<std::uint32_t> missing, unknown;
   for (const std::uint32_t node : nodes)
-    if (const auto found = kept_.find(node); found != kept_.end())
-      found->second.used = clock_;
+    if (resident(node))
+      now_.used.write()[node] = now_.clock;
     else
       missing.push_back(node);
   make_room(missing.size());
@@ -120,69 +117,66 @@ void ColumnCache::need(std::span<const std::uint32_t> nodes) {
     const std::vector<std::uint32_t>& all = source_->nodes();
     const auto k =
         static_cast<std::size_t>(std::lower_bound(all.begin(), all.end(), node) - all.begin());
-    Columns& columns = fresh(node, source_->single());
-    try {
-      if (source_->single())
-        source_->read_single(k, {columns.narrow, 3 * axes_});
-      else
-        source_->read(k, {columns.wide, 3 * axes_});
-    } catch (...) {
-      drop(node);
-      throw;
+    Columns columns;
+    if (source_->single()) {
+      columns.narrow = narrow_->take();
+      source_->read_single(k, {columns.narrow.get(), 3 * axes_});
+    } else {
+      columns.wide = wide_->take();
+      source_->read(k, {columns.wide.get(), 3 * axes_});
     }
     ++read_;
-    bound(columns);
+    put(node, std::move(columns));
   }
   std::erase_if(unknown, [&](std::uint32_t node) {
-    const auto made = ahead_.find(node);
-    if (made == ahead_.end())
+    const auto made = now_.ahead->find(node);
+    if (made == now_.ahead->end())
       return false;
-    Columns& columns = kept_[node];
-    columns.wide = made->second;
-    columns.used = clock_;
-    ahead_.erase(made);
-    bound(columns);
+    put(node, {.wide = made->second});
+    now_.ahead.write().erase(node);
     return true;
   });
-  solve_for(unknown, [&](std::uint32_t node) { return fresh(node, false).wide; });
-  for (const std::uint32_t node : unknown)
-    bound(kept_.at(node));
+  solve_for(unknown, [&](std::uint32_t node, std::shared_ptr<double> columns) {
+    put(node, {.wide = std::move(columns)});
+  });
 }
 
-void ColumnCache::solve_for(std::span<const std::uint32_t> nodes,
-                            const std::function<double*(std::uint32_t node)>& place) {
+void ColumnCache::solve_for(
+    std::span<const std::uint32_t> nodes,
+    const std::function<void(std::uint32_t node, std::shared_ptr<double> columns)>& take) {
   std::vector<double> solved;
   for (std::size_t begin = 0; begin < nodes.size(); begin += solved_at_once) {
     const auto some = nodes.subspan(begin, std::min(solved_at_once, nodes.size() - begin));
     solved.resize(3 * axes_ * some.size());
     solve_(some, solved);
-    for (std::size_t k = 0; k < some.size(); ++k)
+    for (std::size_t k = 0; k < some.size(); ++k) {
+      std::shared_ptr<double> columns = wide_->take();
       std::copy_n(solved.begin() + static_cast<std::ptrdiff_t>(3 * axes_ * k), 3 * axes_,
-                  place(some[k]));
+                  columns.get());
+      take(some[k], std::move(columns));
+    }
   }
 }
 
 void ColumnCache::prepare(std::span<const std::uint32_t> nodes) {
   std::vector<std::uint32_t> missing;
   for (const std::uint32_t node : nodes)
-    if (!stored(node) && !resident(node) && !ahead_.contains(node))
+    if (!stored(node) && !resident(node) && !now_.ahead->contains(node))
       missing.push_back(node);
-  if (kept_.size() + ahead_.size() + missing.size() > capacity_)
-    throw Error("the columns of " + std::to_string(kept_.size() + ahead_.size() + missing.size()) +
+  const std::size_t all = now_.count + now_.ahead->size() + missing.size();
+  if (all > capacity_)
+    throw Error("the columns of " + std::to_string(all) +
                 " nodes do not fit in memory, expected at most " + std::to_string(capacity_));
-  solve_for(missing, [&](std::uint32_t node) { return ahead_[node] = wide_.take(); });
-}
-
-void ColumnCache::bound(Columns& columns) const {
-  if (bounded_)
-    columns.bound =
-        columns.wide == nullptr ? bounds_of(columns.narrow, axes_) : bounds_of(columns.wide, axes_);
+  solve_for(missing, [&](std::uint32_t node, std::shared_ptr<double> columns) {
+    now_.ahead.write()[node] = std::move(columns);
+  });
 }
 
 double ColumnCache::entry(std::uint32_t node, int axis, std::size_t row) const {
-  const Columns& columns = kept_.at(node);
+  const Columns& columns = *(*now_.columns)[node];
   const std::size_t at = static_cast<std::size_t>(axis) * axes_ + row;
-  return columns.wide == nullptr ? static_cast<double>(columns.narrow[at]) : columns.wide[at];
+  return columns.wide == nullptr ? static_cast<double>(columns.narrow.get()[at])
+                                 : columns.wide.get()[at];
 }
 
 double ColumnCache::add(std::span<const NodeVector> forces, double allowed, const Context& context,
@@ -192,7 +186,7 @@ double ColumnCache::add(std::span<const NodeVector> forces, double allowed, cons
   std::vector<Term> terms;
   terms.reserve(3 * forces.size());
   for (const NodeVector& f : forces) {
-    const Columns& columns = kept_.at(f.node);
+    const Columns& columns = *(*now_.columns)[f.node];
     for (int a = 0; a < 3; ++a) {
       if (f.value[a] == 0)
         continue;
@@ -200,9 +194,9 @@ double ColumnCache::add(std::span<const NodeVector> forces, double allowed, cons
       Term& term = terms.emplace_back();
       term.factor = f.value[a];
       if (columns.wide == nullptr)
-        term.narrow = columns.narrow + axis * axes_;
+        term.narrow = columns.narrow.get() + axis * axes_;
       else
-        term.wide = columns.wide + axis * axes_;
+        term.wide = columns.wide.get() + axis * axes_;
       if (bounded_)
         term.bound = columns.bound.data() + axis * blocks;
     }

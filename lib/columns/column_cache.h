@@ -2,6 +2,7 @@
 // Cache of columns of the compliance matrix C = K⁻¹ in memory, as many as fit, and sums of them.
 
 #include "base/context.h"
+#include "base/copy_on_write.h"
 #include "columns/columns.h"
 #include "columns/slot_pool.h"
 #include "contact/load.h"
@@ -10,8 +11,8 @@
 #include <cstdint>
 #include <functional>
 #include <map>
+#include <memory>
 #include <span>
-#include <unordered_map>
 #include <vector>
 
 namespace gewebe {
@@ -22,6 +23,19 @@ using ColumnSolve =
 
 class ColumnCache {
 public:
+  struct Columns { ///< of a node, [axis][3 m]; one of both
+    std::shared_ptr<double> wide{};
+    std::shared_ptr<float> narrow{};
+    std::vector<float> bound{}; ///< [axis][block], rounded up
+  };
+  /// Which columns are in memory, on which choices depend. Copies share the columns.
+  struct Past {
+    CopyOnWrite<std::vector<std::shared_ptr<const Columns>>> columns{}; ///< by node; null: absent
+    CopyOnWrite<std::vector<std::uint64_t>> used{};                     ///< by node: when
+    CopyOnWrite<std::map<std::uint32_t, std::shared_ptr<double>>> ahead{}; ///< see prepare()
+    std::size_t count = 0;
+    std::uint64_t clock = 0;
+  };
   /// Creates a cache of columns with rows for the first m = `nodes` nodes.
   /// \param source  of stored columns, or null; kept by reference
   /// \param bytes  limit of columns in memory; those of two nodes always fit
@@ -32,7 +46,9 @@ public:
   /// Number of nodes whose columns fit in memory.
   std::size_t capacity() const noexcept { return capacity_; }
   bool stored(std::uint32_t node) const;
-  bool resident(std::uint32_t node) const { return kept_.contains(node); }
+  bool resident(std::uint32_t node) const { return (*now_.columns)[node] != nullptr; }
+  const Past& past() const noexcept { return now_; }
+  void restore(const Past& past) { now_ = past; }
   std::uint64_t columns_read() const noexcept { return read_; }
 
   /// Brings columns to memory. If there is no room, the least recently used ones are dropped.
@@ -61,30 +77,23 @@ public:
   std::uint64_t skipped() const noexcept { return skipped_; }
 
 private:
-  struct Columns { ///< of a node, [axis][3 m]; one of both
-    double* wide = nullptr;
-    float* narrow = nullptr;
-    std::vector<float> bound; ///< [axis][block], rounded up
-    std::uint64_t used = 0;
-  };
   struct Term;
-  Columns& fresh(std::uint32_t node, bool single);
+  void put(std::uint32_t node, Columns columns);
   void drop(std::uint32_t node);
-  void bound(Columns& columns) const;
   void make_room(std::size_t count);
-  void solve_for(std::span<const std::uint32_t> nodes,
-                 const std::function<double*(std::uint32_t node)>& place);
+  void
+  solve_for(std::span<const std::uint32_t> nodes,
+            const std::function<void(std::uint32_t node, std::shared_ptr<double> columns)>& take);
 
   std::size_t axes_ = 0; ///< 3 m
   const ColumnSource* source_ = nullptr;
   ColumnSolve solve_;
   bool bounded_ = false;
   std::size_t capacity_ = 0;
-  SlotPool<double> wide_;
-  SlotPool<float> narrow_;
-  std::unordered_map<std::uint32_t, Columns> kept_;
-  std::map<std::uint32_t, double*> ahead_;
-  std::uint64_t clock_ = 0, read_ = 0;
+  std::shared_ptr<SlotPool<double>> wide_;
+  std::shared_ptr<SlotPool<float>> narrow_;
+  Past now_;
+  std::uint64_t read_ = 0;
   mutable std::uint64_t taken_ = 0, skipped_ = 0;
 };
 

@@ -54,6 +54,7 @@ Compliance::Compliance(const Model& model, std::shared_ptr<ComplianceSource> sou
   context_.progress = nullptr;
   if (rows_ < axes_)
     inside_.emplace(axes_ / 3, nullptr, columns_of(axes_), column_bytes(context) / 2, false);
+  source_->set_warm(false); // nothing is done for this one yet
   try {
     source_->open(model, context_);
   } catch (const SingularStiffness& error) {
@@ -61,6 +62,19 @@ Compliance::Compliance(const Model& model, std::shared_ptr<ComplianceSource> sou
       throw;
     free_ = error;
   }
+}
+
+Compliance::Past Compliance::past() const {
+  return {.outer = cache_.past(),
+          .inside = inside_ ? std::optional(inside_->past()) : std::nullopt,
+          .warm = source_->is_warm()};
+}
+
+void Compliance::restore(const Past& past) {
+  cache_.restore(past.outer);
+  if (inside_)
+    inside_->restore(*past.inside);
+  source_->set_warm(past.warm);
 }
 
 void Compliance::require_held() const {

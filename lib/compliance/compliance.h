@@ -113,6 +113,15 @@ public:
   /// \param shapes  number of shapes with these nodes, this one included
   bool columns_for_shape(std::span<const std::uint32_t> nodes, int shapes);
 
+  /// What choices depend on: columns in memory, work that is done once. Copies share it.
+  struct Past {
+    ColumnCache::Past outer{};
+    std::optional<ColumnCache::Past> inside{};
+    bool warm = false;
+  };
+  Past past() const;
+  void restore(const Past& past);
+
   std::uint64_t solves() const noexcept { return solves_; }
   std::uint64_t factors() const { return source_->factors(); } ///< factors computed or loaded
   const ColumnCache& cache() const noexcept { return cache_; }

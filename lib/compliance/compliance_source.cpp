@@ -21,24 +21,29 @@ public:
       return;
     ++factors_;
     solver_.emplace(factorise_axes(model, context));
+    warm_ = true;
   }
   void solve(std::span<double> over_axes, std::size_t columns) override {
     if (!solver_) {
       ++factors_;
       solver_.emplace(stored_axes(*model_, stored_.factor()));
     }
+    warm_ = true;
     solver_->solve(over_axes, columns);
   }
   std::size_t entries() const override {
-    return solver_ ? solver_->factor.entries() : costs::usual_entries(3 * model_->nodes.size());
+    return warm_ ? solver_->factor.entries() : costs::usual_entries(3 * model_->nodes.size());
   }
   std::uint64_t factors() const override { return factors_; }
   const ColumnSource* columns() const override { return stored_.columns.get(); }
+  bool is_warm() const override { return warm_; }
+  void set_warm(bool warm) override { warm_ = warm; }
 
 private:
   StoredStiffness stored_;
   const Model* model_ = nullptr;
   std::optional<AxisSolver> solver_;
+  bool warm_ = false; ///< it counts as loaded
   std::uint64_t factors_ = 0;
 };
 

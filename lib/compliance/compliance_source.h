@@ -43,6 +43,10 @@ public:
   virtual std::uint64_t factors() const { return 0; }
   /// Columns of some nodes or of all, or null. They may be read without open.
   virtual const ColumnSource* columns() const { return nullptr; }
+  /// Whether work that is done once has been done, on which costs, and so choices, depend. A
+  /// rollback restores it; the work stays done.
+  virtual bool is_warm() const = 0;
+  virtual void set_warm(bool warm) = 0;
   /// Source of blocks between nodes that costs less than their columns, or null.
   virtual ForwardBlocks* blocks() { return nullptr; }
 };

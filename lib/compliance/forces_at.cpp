@@ -30,8 +30,8 @@ bool ForcesAt::cheaper(const Load& now, std::size_t limit) const {
 bool ForcesAt::join(std::uint32_t node) {
   Contact contact{node, {}};
   std::vector<ComplianceBlock> with;
-  with.reserve(contacts_.size());
-  for (const Contact& other : contacts_)
+  with.reserve(now_.contacts->size());
+  for (const Contact& other : *now_.contacts)
     with.push_back(compliance_.block(node, other.node));
   const ComplianceBlock own = compliance_.block(node, node);
   std::vector<double> row;
@@ -40,53 +40,57 @@ bool ForcesAt::join(std::uint32_t node) {
       continue;
     contact.axes.push_back(axis_of(node, static_cast<int>(a)));
     row.clear();
-    for (std::size_t k = 0; k < contacts_.size(); ++k)
-      for (const std::size_t axis : contacts_[k].axes)
+    for (std::size_t k = 0; k < now_.contacts->size(); ++k)
+      for (const std::size_t axis : (*now_.contacts)[k].axes)
         row.push_back(with[k][a][axis % 3]);
     for (const std::size_t axis : contact.axes)
       row.push_back(own[a][axis % 3]);
-    if (!block_.append(row)) {
-      block_.remove(block_.size() + 1 - contact.axes.size(), contact.axes.size() - 1);
+    ContactBlock& block = now_.block.write();
+    if (!block.append(row)) {
+      block.remove(block.size() + 1 - contact.axes.size(), contact.axes.size() - 1);
       return false;
     }
   }
-  contacts_.push_back(std::move(contact));
-  ++changes_;
+  now_.contacts.write().push_back(std::move(contact));
+  ++now_.changes;
   return true;
 }
 
 void ForcesAt::leave_all() {
-  contacts_.clear();
-  block_.clear();
-  changes_ = 0;
-  modes_.clear();
+  now_.contacts = {};
+  now_.block = {};
+  now_.changes = 0;
+  now_.modes = {};
 }
 
 /// Whether C_cc of these nodes is positive definite.
 bool ForcesAt::take_nodes(const std::map<std::uint32_t, Vec3>& nodes) {
   std::size_t staying = 0;
-  for (const Contact& c : contacts_)
+  for (const Contact& c : *now_.contacts)
     staying += nodes.contains(c.node) ? 1 : 0;
-  if (staying == contacts_.size() && staying == nodes.size())
+  if (staying == now_.contacts->size() && staying == nodes.size())
     return true;
-  modes_.clear();
-  if (2 * staying < contacts_.size() || changes_ > max_changes)
+  now_.modes = {};
+  if (2 * staying < now_.contacts->size() || now_.changes > max_changes)
     leave_all();
-  shapes_ = 0;
+  now_.shapes = 0;
   compliance_.need_blocks(nodes_of(nodes));
   std::size_t row = 0;
-  for (std::size_t k = 0; k < contacts_.size();) {
-    if (nodes.contains(contacts_[k].node)) {
-      row += contacts_[k++].axes.size();
+  for (std::size_t k = 0; k < now_.contacts->size();) {
+    const Contact& contact = (*now_.contacts)[k];
+    if (nodes.contains(contact.node)) {
+      row += contact.axes.size();
+      ++k;
       continue;
     }
-    block_.remove(row, contacts_[k].axes.size());
-    contacts_.erase(contacts_.begin() + static_cast<std::ptrdiff_t>(k));
-    ++changes_;
+    now_.block.write().remove(row, contact.axes.size());
+    std::vector<Contact>& contacts = now_.contacts.write();
+    contacts.erase(contacts.begin() + static_cast<std::ptrdiff_t>(k));
+    ++now_.changes;
   }
   for (const auto& entry : nodes) {
-    const bool there = std::any_of(contacts_.begin(), contacts_.end(),
-                                   [&](const Contact& c) { return c.node == entry.first; });
+    const bool there = std::ranges::any_of(*now_.contacts,
+                                           [&](const Contact& c) { return c.node == entry.first; });
     if (!there && !join(entry.first)) {
       leave_all();
       return false;
@@ -97,7 +101,7 @@ bool ForcesAt::take_nodes(const std::map<std::uint32_t, Vec3>& nodes) {
 
 std::vector<std::size_t> ForcesAt::axes() const {
   std::vector<std::size_t> all;
-  for (const Contact& c : contacts_)
+  for (const Contact& c : *now_.contacts)
     all.insert(all.end(), c.axes.begin(), c.axes.end());
   return all;
 }
@@ -105,7 +109,7 @@ std::vector<std::size_t> ForcesAt::axes() const {
 std::vector<NodeVector> ForcesAt::by_node(std::span<const double> force) const {
   std::vector<NodeVector> list;
   std::size_t row = 0;
-  for (const Contact& c : contacts_) {
+  for (const Contact& c : *now_.contacts) {
     NodeVector& f = list.emplace_back(NodeVector{c.node, {}});
     for (const std::size_t axis : c.axes)
       f.value[static_cast<int>(axis % 3)] = force[row++];
@@ -129,16 +133,16 @@ bool ForcesAt::meet(const Load& now) {
     wanted[k] = d - wanted[k];
   }
   std::vector<double> f = wanted, back(wanted.size()), correction(wanted.size());
-  block_.solve(f);
+  now_.block->solve(f);
   double miss = 0;
   for (int round = 0; round < 2; ++round) { // once more where updates of the factor left error
-    block_.multiply(f, back);
+    now_.block->multiply(f, back);
     for (std::size_t k = 0; k < back.size(); ++k)
       correction[k] = wanted[k] - back[k];
     miss = largest_size(correction);
     if (round == 1 || miss <= 1e-13 * size)
       break;
-    block_.solve(correction);
+    now_.block->solve(correction);
     for (std::size_t k = 0; k < f.size(); ++k)
       f[k] += correction[k];
   }
@@ -147,20 +151,21 @@ bool ForcesAt::meet(const Load& now) {
   if (!(miss <= contact_tolerance))
     return false;
   miss_ = std::max(miss_, miss);
-  question_ = std::move(wanted);
-  counted_ = false;
-  force_ = std::move(f);
+  now_.question = std::move(wanted);
+  now_.counted = false;
+  now_.force = std::move(f);
   return true;
 }
 
 /// Combines earlier shapes of rigid motions, if this is a rigid motion. \return whether it is
 bool ForcesAt::shape(const Load& now, std::vector<double>& u) {
-  if (contacts_.size() < costs::worth_modes || (modes_.size() == 0 && !modes_.open()))
+  if (now_.contacts->size() < costs::worth_modes ||
+      (now_.modes->size() == 0 && !now_.modes->open()))
     return false;
   std::vector<double> coefficients, rest;
-  if (!modes_.express(question_, coefficients, rest)) {
-    if (!modes_.open()) {
-      modes_.give_up();
+  if (!now_.modes->express(*now_.question, coefficients, rest)) {
+    if (!now_.modes->open()) {
+      now_.modes.write().give_up();
       return false;
     }
     double square = 0;
@@ -170,13 +175,13 @@ bool ForcesAt::shape(const Load& now, std::vector<double>& u) {
     for (double& r : rest)
       r /= length;
     std::vector<double> f = rest, answer(compliance_.rows(), 0);
-    block_.solve(f);
+    now_.block->solve(f);
     compliance_.add(by_node(f), 0, answer);
-    modes_.add(rest, std::move(answer));
+    now_.modes.write().add(rest, std::move(answer));
     coefficients.push_back(length);
   }
   u = answer_.whole(now);
-  modes_.answer(coefficients, u);
+  now_.modes->answer(coefficients, u);
   return true;
 }
 

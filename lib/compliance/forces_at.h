@@ -2,6 +2,7 @@
 // Solver for prescribed displacements by the block C_cc on their free axes: f_c = C_cc⁻¹ (d - u_c
 // of all other loads). Its factor is updated when nodes join and leave.
 
+#include "base/copy_on_write.h"
 #include "compliance/compliance.h"
 #include "compliance/contact_block.h"
 #include "compliance/load_answer.h"
@@ -20,6 +21,25 @@ namespace gewebe {
 /// Reactions of a set of displaced nodes.
 class ForcesAt {
 public:
+  struct Contact {
+    std::uint32_t node = 0;
+    std::vector<std::size_t> axes;
+  };
+  /// Factor of C_cc and shapes of rigid motions, whose bits depend on which nodes came when. Copies
+  /// share them.
+  struct Past {
+    CopyOnWrite<std::vector<Contact>> contacts{}; ///< in order of arrival
+    CopyOnWrite<ContactBlock> block{};
+    std::uint64_t changes = 0;                   ///< of the block
+    CopyOnWrite<std::vector<double>> question{}; ///< d - u_c
+    CopyOnWrite<std::vector<double>> force{};    ///< by axis of the block
+    int shapes = 0;                              ///< see ForcesAt::shapes()
+    bool counted = false;                        ///< `shapes` includes the last load
+    CopyOnWrite<ShapeModes> modes{};             ///< of these nodes: from d - u_c to the shape
+  };
+  const Past& past() const noexcept { return now_; }
+  void restore(const Past& past) { now_ = past; }
+
   /// Keeps references to all.
   ForcesAt(const Model& model, Compliance& compliance, LoadAnswer& answer)
       : model_(model), compliance_(compliance), answer_(answer) {}
@@ -31,32 +51,28 @@ public:
   /// Finds the forces. \return whether they produce the displacements
   bool meet(const Load& now);
   /// Reactions under the last load of meet(), by ascending node.
-  std::vector<NodeVector> forces() const { return by_node(force_); }
+  std::vector<NodeVector> forces() const { return by_node(*now_.force); }
   /// The first rows() of the shape under that load, if the displacements are a rigid motion of
   /// these nodes whose shape follows from earlier ones. \return whether it was found
   bool shape(const Load& now, std::vector<double>& u);
   /// Number of loads with these nodes whose shapes were computed by other means, this one included.
   int shapes() {
-    shapes_ += counted_ ? 0 : 1;
-    counted_ = true;
-    return shapes_;
+    now_.shapes += now_.counted ? 0 : 1;
+    now_.counted = true;
+    return now_.shapes;
   }
 
   /// Rows of C_cc.
   std::vector<std::size_t> axes() const;
   /// x = C_cc⁻¹ x.
-  void solve(std::span<double> x) const { block_.solve(x); }
+  void solve(std::span<double> x) const { now_.block->solve(x); }
   /// Forces by row of C_cc.
-  std::span<const double> force() const { return force_; }
+  std::span<const double> force() const { return *now_.force; }
 
   /// Largest error of a prescribed displacement so far, over the largest displacement.
   double largest_miss() const noexcept { return miss_; }
 
 private:
-  struct Contact {
-    std::uint32_t node = 0;
-    std::vector<std::size_t> axes;
-  };
   bool join(std::uint32_t node);
   void leave_all();
   bool take_nodes(const std::map<std::uint32_t, Vec3>& nodes);
@@ -65,14 +81,7 @@ private:
   const Model& model_;
   Compliance& compliance_;
   LoadAnswer& answer_;
-  std::vector<Contact> contacts_; ///< in order of arrival
-  ContactBlock block_;
-  std::uint64_t changes_ = 0;    ///< of the block
-  std::vector<double> question_; ///< d - u_c
-  std::vector<double> force_;    ///< by axis of the block
-  int shapes_ = 0;               ///< see shapes()
-  bool counted_ = false;         ///< shapes_ includes the last load
-  ShapeModes modes_;             ///< of these nodes: from d - u_c to the shape
+  Past now_;
   double miss_ = 0;
 };
 

@@ -10,8 +10,7 @@ constexpr std::size_t max_kept = 1024; ///< nodes; some 50 kB each on 10,000 nod
 
 } // namespace
 
-ForwardBlocks::ForwardBlocks(std::shared_ptr<FrontalFactor> factor, std::function<void()> check)
-    : factor_(std::move(factor)), check_(std::move(check)) {}
+ForwardBlocks::ForwardBlocks(std::function<FrontalFactor&()> factor) : factor_(std::move(factor)) {}
 
 void ForwardBlocks::need(std::span<const std::uint32_t> nodes) {
   std::vector<std::uint32_t> missing;
@@ -20,28 +19,28 @@ void ForwardBlocks::need(std::span<const std::uint32_t> nodes) {
       missing.push_back(node);
   if (missing.empty())
     return;
-  check_();
   if (solves_.size() + missing.size() > max_kept) {
     solves_.clear();
     missing.assign(nodes.begin(), nodes.end());
   }
-  std::vector<FrontalFactor::ForwardSolve> solved = factor_->forward_solves(missing);
+  std::vector<FrontalFactor::ForwardSolve> solved = factor_().forward_solves(missing);
   for (std::size_t k = 0; k < missing.size(); ++k)
     solves_[missing[k]] = std::move(solved[k]);
 }
 
 ComplianceBlock ForwardBlocks::block(std::uint32_t node, std::uint32_t other) const {
-  return factor_->compliance(solves_.at(node), solves_.at(other));
+  return factor_().compliance(solves_.at(node), solves_.at(other));
 }
 
 std::vector<Vec3> ForwardBlocks::answers(std::span<const double> over_axes,
                                          std::span<const std::uint32_t> nodes) {
-  check_();
-  (void)factor_->carry(over_axes);
+  need(nodes); // they may have been dropped since
+  FrontalFactor& factor = factor_();
+  (void)factor.carry(over_axes);
   std::vector<Vec3> all;
   all.reserve(nodes.size());
   for (const std::uint32_t node : nodes) {
-    const std::array<double, 3> u = factor_->carried(solves_.at(node));
+    const std::array<double, 3> u = factor.carried(solves_.at(node));
     all.push_back({u[0], u[1], u[2]});
   }
   return all;

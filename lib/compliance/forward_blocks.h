@@ -7,7 +7,6 @@
 
 #include <cstdint>
 #include <functional>
-#include <memory>
 #include <span>
 #include <unordered_map>
 #include <vector>
@@ -16,8 +15,8 @@ namespace gewebe {
 
 class ForwardBlocks {
 public:
-  /// \param check  called before the factor is read; throws if it is no longer that of the model
-  ForwardBlocks(std::shared_ptr<FrontalFactor> factor, std::function<void()> check);
+  /// \param factor  always the same one; called whenever it is read
+  explicit ForwardBlocks(std::function<FrontalFactor&()> factor);
 
   /// Prepares blocks between these nodes, and between these and nodes that were needed before.
   /// Earlier nodes may be dropped.
@@ -25,13 +24,11 @@ public:
   /// \pre both nodes were in the last call of need()
   ComplianceBlock block(std::uint32_t node, std::uint32_t other) const;
   /// C f at these nodes, from a solution that the factor updates from cut to cut.
-  /// \pre the nodes were among the last ones needed
   std::vector<Vec3> answers(std::span<const double> over_axes,
                             std::span<const std::uint32_t> nodes);
 
 private:
-  std::shared_ptr<FrontalFactor> factor_;
-  std::function<void()> check_;
+  std::function<FrontalFactor&()> factor_;
   std::unordered_map<std::uint32_t, FrontalFactor::ForwardSolve> solves_;
 };
 

@@ -42,7 +42,9 @@ std::vector<NodeVector> as_vectors(const std::map<std::uint32_t, Vec3>& values) 
 }
 
 LoadAnswer::LoadAnswer(const Model& model, Compliance& compliance)
-    : model_(model), compliance_(compliance), answer_(compliance.rows(), 0) {}
+    : model_(model), compliance_(compliance) {
+  now_.answer.write().resize(compliance.rows());
+}
 
 const std::vector<double>& LoadAnswer::weight(const Vec3& gravity) {
   if (gravity == weight_gravity_)
@@ -63,13 +65,14 @@ const std::vector<double>& LoadAnswer::weight(const Vec3& gravity) {
 /// Forces that differ from those of the answer, by their difference.
 std::vector<NodeVector> LoadAnswer::changed_forces(const std::map<std::uint32_t, Vec3>& now) const {
   std::vector<NodeVector> changed;
-  auto a = force_.begin();
+  const std::map<std::uint32_t, Vec3>& force = *now_.force;
+  auto a = force.begin();
   auto b = now.begin();
-  while (a != force_.end() || b != now.end()) {
-    if (b == now.end() || (a != force_.end() && a->first < b->first)) {
+  while (a != force.end() || b != now.end()) {
+    if (b == now.end() || (a != force.end() && a->first < b->first)) {
       changed.push_back({a->first, -a->second});
       ++a;
-    } else if (a == force_.end() || b->first < a->first) {
+    } else if (a == force.end() || b->first < a->first) {
       changed.push_back({b->first, b->second});
       ++b;
     } else {
@@ -84,47 +87,50 @@ std::vector<NodeVector> LoadAnswer::changed_forces(const std::map<std::uint32_t,
 
 /// Whether the answer is found from the last one.
 bool LoadAnswer::follows(const Load& load, std::size_t changed) const {
-  return load.gravity == gravity_ && changed < load.force.size() && increments_ < max_increments;
+  return load.gravity == now_.gravity && changed < load.force.size() &&
+         now_.increments < max_increments;
 }
 
 void LoadAnswer::note(const Load& load) {
   if (known(load))
     return;
   std::vector<NodeVector> changed =
-      load.gravity == gravity_ ? changed_forces(load.force) : std::vector<NodeVector>{};
+      load.gravity == now_.gravity ? changed_forces(load.force) : std::vector<NodeVector>{};
   if (follows(load, changed.size())) {
-    pending_.push_back(std::move(changed));
-    ++increments_;
+    now_.pending.write().push_back(std::move(changed));
+    ++now_.increments;
   } else {
-    pending_.clear();
-    fresh_ = as_vectors(load.force);
-    increments_ = 0;
+    now_.pending = {};
+    now_.fresh = std::optional(as_vectors(load.force));
+    now_.increments = 0;
   }
-  gravity_ = load.gravity;
-  force_ = load.force;
+  now_.gravity = load.gravity;
+  now_.force.replace() = load.force;
 }
 
 /// Makes the answer that of the load noted last.
 void LoadAnswer::settle() {
-  if (!fresh_ && pending_.empty())
+  if (!*now_.fresh && now_.pending->empty())
     return;
-  const Vec3 gravity = gravity_;
+  const Vec3 gravity = now_.gravity;
   forget(); // should a sum fail
-  if (fresh_) {
-    answer_ = weight(gravity);
-    answer_.resize(compliance_.rows(), 0);
-    compliance_.add(*fresh_, 0, answer_);
-    fresh_.reset();
+  if (*now_.fresh) {
+    std::vector<double>& answer = now_.answer.replace();
+    answer = weight(gravity);
+    answer.resize(compliance_.rows(), 0);
+    compliance_.add(**now_.fresh, 0, answer);
+    now_.fresh = {};
   }
-  for (const std::vector<NodeVector>& changed : std::exchange(pending_, {}))
-    compliance_.add(changed, 0, answer_);
-  gravity_ = gravity;
+  const auto pending = std::exchange(now_.pending, {});
+  for (const std::vector<NodeVector>& changed : *pending)
+    compliance_.add(changed, 0, now_.answer.write());
+  now_.gravity = gravity;
 }
 
 const std::vector<double>& LoadAnswer::whole(const Load& load) {
   note(load);
   settle();
-  return answer_;
+  return *now_.answer;
 }
 
 /// The answer over all axes, by a solve.
@@ -158,7 +164,7 @@ std::vector<double> LoadAnswer::at(const Load& load, std::span<const std::size_t
     compliance_.add_rows(as_vectors(load.force), rows, values);
     return values;
   }
-  if (increments_ > 0)
+  if (now_.increments > 0)
     forget();
   const std::vector<double>& all = whole(load);
   for (const std::size_t row : rows)

@@ -3,6 +3,7 @@
 // changes of the load. If a caller reads a few rows, only these are computed. Inner nodes of a
 // solid, which sums of the compliance have no rows for, are solved for when they are first read.
 
+#include "base/copy_on_write.h"
 #include "compliance/compliance.h"
 #include "contact/load.h"
 #include "model/model.h"
@@ -27,11 +28,26 @@ std::vector<NodeVector> as_vectors(const std::map<std::uint32_t, Vec3>& values);
 /// Displacement ("answer") under the last load, and its update for the next one.
 class LoadAnswer {
 public:
+  /// The running sum, whose bits depend on the loads before. Copies share it.
+  struct Past {
+    CopyOnWrite<std::map<std::uint32_t, Vec3>> force{}; ///< load of the answer, once it is settled
+    Vec3 gravity{};
+    CopyOnWrite<std::vector<double>> answer{};
+    std::uint64_t increments = 0; ///< number of updates of the answer
+    // Deferred work: first all of these forces, then the increments.
+    CopyOnWrite<std::optional<std::vector<NodeVector>>> fresh{};
+    CopyOnWrite<std::vector<std::vector<NodeVector>>> pending{};
+  };
+  const Past& past() const noexcept { return now_; }
+  void restore(const Past& past) { now_ = past; }
+
   /// Keeps references to both.
   LoadAnswer(const Model& model, Compliance& compliance);
 
   /// Whether the last answer is that for this load.
-  bool known(const Load& load) const { return load.gravity == gravity_ && load.force == force_; }
+  bool known(const Load& load) const {
+    return load.gravity == now_.gravity && load.force == *now_.force;
+  }
   /// Answer at the first rows() of the compliance.
   const std::vector<double>& whole(const Load& load);
   /// Deferred form of whole(load): later answers have the same bits as after whole(load), but the
@@ -50,19 +66,13 @@ private:
   const std::vector<double>& everywhere(const Load& load);
   bool follows(const Load& load, std::size_t changed) const;
   void settle();
-  void forget() { gravity_ = {HUGE_VAL, HUGE_VAL, HUGE_VAL}; }
+  void forget() { now_.gravity = {HUGE_VAL, HUGE_VAL, HUGE_VAL}; }
 
   const Model& model_;
   Compliance& compliance_;
   Vec3 weight_gravity_;
   std::vector<double> weight_;
-  std::map<std::uint32_t, Vec3> force_; ///< load of the answer, once it is settled
-  Vec3 gravity_;
-  std::vector<double> answer_;
-  std::uint64_t increments_ = 0; ///< number of updates of answer_
-  // Deferred work: first all of these forces, then the increments.
-  std::optional<std::vector<NodeVector>> fresh_;
-  std::vector<std::vector<NodeVector>> pending_;
+  Past now_;
   Load solved_; ///< load of everywhere_
   std::vector<double> everywhere_;
   Load carried_; ///< load of carried_at_

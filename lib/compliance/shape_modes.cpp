@@ -30,17 +30,17 @@ bool ShapeModes::express(std::span<const double> question, std::vector<double>& 
   rest.assign(question.begin(), question.end());
   for (int twice = 0; twice < 2; ++twice) // Gram and Schmidt, and once more for what rounding left
     for (std::size_t k = 0; k < questions_.size(); ++k) {
-      const double c = dot(questions_[k], rest);
+      const double c = dot(*questions_[k], rest);
       coefficients[k] += c;
       for (std::size_t r = 0; r < rest.size(); ++r)
-        rest[r] -= c * questions_[k][r];
+        rest[r] -= c * (*questions_[k])[r];
     }
   return std::sqrt(dot(rest, rest)) <= within_span * std::sqrt(dot(question, question));
 }
 
 void ShapeModes::add(std::vector<double> question, std::vector<double> answer) {
-  questions_.push_back(std::move(question));
-  answers_.push_back(std::move(answer));
+  questions_.push_back(std::make_shared<const std::vector<double>>(std::move(question)));
+  answers_.push_back(std::make_shared<const std::vector<double>>(std::move(answer)));
 }
 
 void ShapeModes::give_up() {
@@ -51,7 +51,7 @@ void ShapeModes::give_up() {
 void ShapeModes::answer(std::span<const double> coefficients, std::span<double> answer) const {
   for (std::size_t k = 0; k < answers_.size(); ++k)
     for (std::size_t r = 0; r < answer.size(); ++r)
-      answer[r] += coefficients[k] * answers_[k][r];
+      answer[r] += coefficients[k] * (*answers_[k])[r];
 }
 
 } // namespace gewebe

@@ -5,12 +5,13 @@
 // the number of nodes.
 
 #include <cstddef>
+#include <memory>
 #include <span>
 #include <vector>
 
 namespace gewebe {
 
-/// Basis of inputs and their outputs.
+/// Basis of inputs and their outputs. A copy shares both.
 class ShapeModes {
 public:
   /// Largest number of modes: those of a rigid grasp, and some for other loads and for rounding.
@@ -36,7 +37,7 @@ public:
   void answer(std::span<const double> coefficients, std::span<double> answer) const;
 
 private:
-  std::vector<std::vector<double>> questions_, answers_;
+  std::vector<std::shared_ptr<const std::vector<double>>> questions_, answers_;
   bool given_up_ = false;
 };
 

@@ -77,12 +77,10 @@ public:
   /// \pre one entry for each node; 0 along axes that the model holds
   virtual void set_motion(std::span<const NodeMotion> motion) = 0;
 
-  /// Everything that determines the future motion, without caches (see renew).
+  /// Everything that determines the future motion, to the bit. Copies share large parts of it.
   virtual std::any snapshot() const = 0;
   /// Rolls back to a snapshot. \pre a snapshot of this object
   virtual void go_back(const std::any& snapshot) = 0;
-  /// Drops caches: factors, first guesses.
-  virtual void renew() = 0;
 
   /// Reactions of the displaced nodes: the force on the object, per node in ascending order; 0
   /// along

@@ -65,7 +65,6 @@ public:
   void go_back(const std::any& snapshot) override {
     restore(std::any_cast<const State&>(snapshot));
   }
-  void renew() override {} // there are no caches
 
   std::vector<NodeVector> contact_forces() const override;
 

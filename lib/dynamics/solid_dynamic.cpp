@@ -114,6 +114,10 @@ SolidMotion& SolidDynamic::engine(const Context& context) {
                     context);
     engine_->hold(held_);
     engine_->restore(*state_.places, *state_.velocity, context);
+  } else if (behind_) {
+    engine_->restore(*state_.places, *state_.velocity, held_, *state_.past, context);
+    state_.past = nullptr;
+    behind_ = false;
   }
   return *engine_;
 }
@@ -152,6 +156,8 @@ Vec3 SolidDynamic::held_at(std::uint32_t node, double time) const {
 }
 
 void SolidDynamic::apply_load(double time) {
+  if (engine_)
+    (void)engine(context_);
   const std::vector<std::uint8_t> held_before = std::exchange(held_, {});
   read_load();
   bool jumped = false;
@@ -224,25 +230,40 @@ void SolidDynamic::set_motion(std::span<const NodeMotion> motion) {
       velocity[axis_of(i, a)] = motion[i].velocity[a];
     }
   }
-  renew();
+  begin_anew();
   apply_load(state_.time);
+}
+
+std::any SolidDynamic::snapshot() const {
+  State state = state_;
+  if (engine_ && !behind_)
+    state.past = engine_->past();
+  return state;
 }
 
 void SolidDynamic::go_back(const std::any& snapshot) {
   const State& was = std::any_cast<const State&>(snapshot);
   const bool same = was.version == state_.version;
+  const std::shared_ptr<const SolidMotion::Past> past =
+      same && !behind_ ? nullptr : was.past; // else the engine has it
   state_ = was;
+  state_.past = past;
   if (same)
     return;
   read_load();
-  renew();
   motion_shown_ = false;
+  behind_ = past != nullptr;
+  if (!behind_)
+    begin_anew();
 }
 
-void SolidDynamic::renew() {
+/// The next engine knows nothing of earlier steps.
+void SolidDynamic::begin_anew() {
   body_.reset();
   engine_.reset();
-  last_step_ = 0;
+  behind_ = false;
+  state_.past = nullptr;
+  state_.last_step = 0;
 }
 
 std::uint64_t SolidDynamic::advance(double duration, double largest_step, const Context& context,
@@ -255,9 +276,9 @@ std::uint64_t SolidDynamic::advance(double duration, double largest_step, const 
     throw Error("a step of this length takes over 1e9 integration steps, expected fewer");
   const double count = std::max(1.0, std::ceil(exact));
   double h = duration / count;
-  if (std::abs(h - last_step_) <= same_step * last_step_)
-    h = last_step_; // so that the factor serves on
-  last_step_ = h;
+  if (std::abs(h - state_.last_step) <= same_step * state_.last_step)
+    h = state_.last_step; // so that the factor serves on
+  state_.last_step = h;
   const auto steps = static_cast<std::uint64_t>(count);
   const auto since = std::chrono::steady_clock::now();
   (void)engine(context);
@@ -369,11 +390,12 @@ contact::ContactBody& SolidDynamic::begin_contact_step(double from, double to,
                                                        const Context& context) {
   SolidMotion& moving = engine(context);
   double h = to - from;
-  if (std::abs(h - last_step_) <= same_step * last_step_)
-    h = last_step_; // so that the factor serves on
-  last_step_ = h;
+  if (std::abs(h - state_.last_step) <= same_step * state_.last_step)
+    h = state_.last_step; // so that the factor serves on
+  state_.last_step = h;
   from_ = from;
   to_ = to;
+  state_.version = ++versions_;
   if (!body_)
     body_ =
         std::make_unique<SolidContactBody>(moving, collision_surface().node, model_.nodes.size());

@@ -51,9 +51,8 @@ public:
   std::span<const NodeMotion> motion() const override;
   void set_motion(std::span<const NodeMotion> motion) override;
 
-  std::any snapshot() const override { return state_; }
+  std::any snapshot() const override;
   void go_back(const std::any& snapshot) override;
-  void renew() override;
 
   std::vector<NodeVector> contact_forces() const override;
 
@@ -77,6 +76,9 @@ private:
     std::uint64_t version = 0; ///< of all these
     int quiet = 0;             ///< number of steps in a row with almost no motion
     bool resting = false;
+    double last_step = 0; ///< of the engine
+    /// What earlier steps left to the engine; null in the present state, which the engine has.
+    std::shared_ptr<const SolidMotion::Past> past{};
 
     /// Contact forces at the end of the last step, by ascending vertex.
     std::vector<contact::VertexForce> contact{};
@@ -85,6 +87,7 @@ private:
   void read_load();
   void apply_load(double time);
   void take_over();
+  void begin_anew();
   SolidMotion& engine(const Context& context);
   std::vector<double> forces_at(double time) const;
   Vec3 held_at(std::uint32_t node, double time) const;
@@ -110,7 +113,7 @@ private:
   std::vector<PressedCorner> pressed_;
 
   std::optional<SolidMotion> engine_;
-  double last_step_ = 0; ///< of the engine
+  bool behind_ = false; ///< the engine has to go back to the state first
   std::optional<contact::ModelSurface> surface_;
   std::optional<contact::TypicalContact> typical_; ///< of the model
   std::unique_ptr<SolidContactBody> body_;         ///< of the engine

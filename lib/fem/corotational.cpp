@@ -86,7 +86,9 @@ struct NodeSums {
 template <std::size_t Nodes>
 struct Groups {
   std::vector<CorotationalGroup<Nodes>> groups;
-  std::vector<CorotationalStrains<Nodes>> strains, before;
+  using Strains = std::vector<CorotationalStrains<Nodes>>;
+  std::shared_ptr<Strains> strains = std::make_shared<Strains>();
+  std::shared_ptr<const Strains> before = strains; ///< shared with snapshots
   std::vector<CorotationalRotations> rotations;
   /// Rotations of nodes' elements times volumes, [9 k + entry][lane] of node 4 k + lane.
   std::vector<std::array<double[4], 9>> turns;
@@ -97,8 +99,8 @@ struct Groups {
   void make(const TetMesh& mesh, std::span<const SolidElement> elements,
             const CorotationalNotes& notes) {
     groups.resize((elements.size() + 3) / 4);
-    strains.resize(notes.strains ? groups.size() : 0);
-    before.resize(strains.size());
+    strains = std::make_shared<Strains>(notes.strains ? groups.size() : 0);
+    before = std::make_shared<Strains>(*strains);
     rotations.resize(notes.frames ? groups.size() : 0);
     turns.resize((mesh.points.size() + 3) / 4);
     for (std::size_t k = 0; k < 4 * groups.size(); ++k) {
@@ -122,14 +124,16 @@ struct Groups {
   }
 
   void note_all() {
-    strains.resize(groups.size());
-    before.resize(groups.size());
+    if (before->empty())
+      before = std::make_shared<Strains>(groups.size());
     rotations.resize(groups.size());
   }
 
   double evaluate(CorotationalEvaluate<Nodes> kernel, std::span<const double> x,
                   const CorotationalWeights& weights, std::span<double> forces,
                   const Context& context, bool with_turns) {
+    if (strains.use_count() != 1 || strains->size() != before->size())
+      strains = std::make_shared<Strains>(before->size());
     std::vector<std::array<double, 2>> energy((groups.size() + grain - 1) / grain);
     const auto block = [&](std::size_t begin, std::size_t end, double* to) {
       std::array<CorotationalResult<Nodes>, corotational_together> results;
@@ -138,8 +142,8 @@ struct Groups {
         const std::size_t count = std::min(corotational_together, end - n);
         kernel(groups.data() + n, count,
                {x.data(), sums.local.data() + n, to, with_turns,
-                before.empty() ? nullptr : before.data() + n,
-                strains.empty() ? nullptr : strains.data() + n, weights},
+                before->empty() ? nullptr : before->data() + n,
+                strains->empty() ? nullptr : strains->data() + n, weights},
                results.data());
         for (std::size_t k = 0; k < count; ++k) {
           for (std::size_t lane = 0; lane < 4; ++lane) {
@@ -173,8 +177,10 @@ struct Groups {
   }
 
   void remember() {
-    if (!remembered)
-      std::swap(before, strains);
+    if (remembered)
+      return;
+    std::shared_ptr<const Strains> last = std::move(strains);
+    strains = std::const_pointer_cast<Strains>(std::exchange(before, std::move(last)));
     remembered = true;
   }
 
@@ -183,9 +189,9 @@ struct Groups {
     ElementFrame frame;
     for (std::size_t c = 0; c < 9; ++c)
       frame.rotation[c] = rotations[t / 4].value[c][t % 4];
-    if (strains.empty())
+    if (before->empty())
       return frame;
-    const auto& of = (remembered ? before : strains)[t / 4].value;
+    const auto& of = (remembered ? *before : *strains)[t / 4].value;
     for (std::size_t c = 0; c < 6; ++c) { // the mean strain is that of the middle
       for (std::size_t p = 0; p < points; ++p)
         frame.stretch[c] += of[6 * p + c][t % 4] / points;
@@ -237,6 +243,17 @@ double CorotationalSolid::elastic_energy() const noexcept {
 
 void CorotationalSolid::remember() {
   state_->with([](auto& of) { of.remember(); });
+}
+
+std::shared_ptr<const void> CorotationalSolid::strains() const {
+  return state_->with([](const auto& of) -> std::shared_ptr<const void> { return of.before; });
+}
+
+void CorotationalSolid::restore_strains(std::shared_ptr<const void> strains) {
+  state_->with([&]<class Of>(Of& of) {
+    of.before = std::static_pointer_cast<const typename Of::Strains>(std::move(strains));
+    of.remembered = false;
+  });
 }
 
 void CorotationalSolid::node_rotations(std::span<double> rotations, const Context& context) {

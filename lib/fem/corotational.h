@@ -69,6 +69,9 @@ public:
   /// The strains of the last evaluate() are those that damping counts from. From the start they are
   /// those at rest.
   void remember();
+  /// The strains that damping counts from, which are not written again, and those of earlier times.
+  std::shared_ptr<const void> strains() const;
+  void restore_strains(std::shared_ptr<const void> strains);
   /// Of each node the rotation nearest to the mean of its elements', by rows, 9 n: as in the last
   /// evaluate() with turns. That of a node of no element is none.
   void node_rotations(std::span<double> rotations, const Context& context);

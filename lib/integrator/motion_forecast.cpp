@@ -10,16 +10,16 @@ void MotionForecast::add(Numbers acceleration, const Numbers& masses, const Cont
   for (std::size_t i = most; i-- > 1;)
     for (std::size_t j = most; j-- > 1;)
       product_[i][j] = product_[i - 1][j - 1];
-  past_.push_front(std::move(acceleration));
+  past_.emplace_front(std::move(acceleration));
   if (past_.size() > most)
     past_.pop_back();
-  const Numbers& newest = past_.front();
+  const Numbers& newest = *past_.front();
   product_[0] =
       sums_of_axes<most>(context, newest.size(),
                          [&](std::size_t begin, std::size_t end, std::array<double, most>& sums) {
                            for (std::size_t j = 0; j < past_.size(); ++j)
                              for (std::size_t axis = begin; axis < end; ++axis)
-                               sums[j] += masses[axis / 3] * newest[axis] * past_[j][axis];
+                               sums[j] += masses[axis / 3] * newest[axis] * (*past_[j])[axis];
                          });
   for (std::size_t j = 1; j < most; ++j)
     product_[j][0] = product_[0][j];
@@ -67,13 +67,14 @@ void MotionForecast::add_to(Numbers& to, double factor, const Context& context) 
   parallel_blocks(context, to.size(), axes_grain, [&](std::size_t begin, std::size_t end) {
     for (std::size_t k = 0; k < std::min(terms, past_.size()); ++k)
       gewebe::add(std::span(to).subspan(begin, end - begin), factor * weight[k],
-                  std::span(past_[k]).subspan(begin, end - begin));
+                  std::span(*past_[k]).subspan(begin, end - begin));
   });
 }
 
 void MotionForecast::hold(std::size_t axis) {
-  for (Numbers& one : past_)
-    one[axis] = 0;
+  for (CopyOnWrite<Numbers>& one : past_)
+    if ((*one)[axis] != 0)
+      one.write()[axis] = 0;
 }
 
 } // namespace gewebe

@@ -2,6 +2,7 @@
 // Where a step of integrator/solid_motion.h begins to seek.
 
 #include "base/context.h"
+#include "base/copy_on_write.h"
 #include "integrator/motion_numbers_internal.h"
 
 #include <cstddef>
@@ -26,7 +27,7 @@ private:
   static constexpr std::size_t terms = 3, most = terms + 2;
   std::array<double, terms> weights() const;
 
-  std::deque<Numbers> past_;                             ///< newest first
+  std::deque<CopyOnWrite<Numbers>> past_;                ///< newest first
   std::array<std::array<double, most>, most> product_{}; ///< of them, by masses
 };
 

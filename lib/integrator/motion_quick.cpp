@@ -51,10 +51,10 @@ void add_masses(const MotionBody& body, double h, StiffnessMatrix& matrix) {
 int MotionQuick::prepare(const MotionBody& body, const MotionSprings& springs,
                          const std::vector<std::uint8_t>& held, double h,
                          const SolidMotionOptions& options, const Context& context) {
-  if (factor_ && step_ == h && held_ == held)
+  if (factor_ && step_ == h && *held_ == held)
     return 0;
   const double scale = 1 + options.damping / h;
-  const bool same_pattern = factor_ && held_ == held;
+  const bool same_pattern = factor_ && *held_ == held;
   if (!same_pattern) {
     // Springs are bounded along every axis alike: of a net alone one matrix serves all three.
     alike_ = body.mesh.tetrahedra.empty() && held_by_nodes(held);
@@ -76,7 +76,8 @@ int MotionQuick::prepare(const MotionBody& body, const MotionSprings& springs,
   single_.emplace(*factor_);
   version_ = unique_number();
   step_ = h;
-  held_ = held;
+  if (*held_ != held)
+    held_.replace() = held;
   tangent_.taken = false;
   forget();
   still_.resize(body.nodes());
@@ -89,21 +90,57 @@ int MotionQuick::prepare(const MotionBody& body, const MotionSprings& springs,
 
 void MotionQuick::take_tangent(const MotionBody& body, const MotionSprings& springs,
                                const Numbers& at, const Context& context) {
-  const bool same_pattern = tangent_.factor && tangent_.held == held_;
-  if (!same_pattern)
-    tangent_.axes = solid_stiffness(body.mesh, body.elements, held_, context);
+  if (!(tangent_.factor && tangent_.held == *held_))
+    tangent_.axes = solid_stiffness(body.mesh, body.elements, *held_, context);
   StiffnessMatrix a = springs.with_tangent(tangent_.axes, at, 1 / step_);
   add_masses(body, step_, a);
   drop_tangent();
-  if (same_pattern)
-    tangent_.factor->refactor(a, context);
-  else
-    tangent_.factor.emplace(a, context);
-  tangent_.single.emplace(*tangent_.factor);
-  tangent_.held = held_;
+  tangent_.version = 0; // should it fail
+  tangent_.matrix = std::make_shared<const StiffnessMatrix>(std::move(a));
+  factorise_tangent(context);
   tangent_.taken = true;
-  version_ = unique_number();
+  tangent_.version = version_ = unique_number();
   forget();
+}
+
+void MotionQuick::factorise_tangent(const Context& context) {
+  if (tangent_.factor && tangent_.held == *held_)
+    tangent_.factor->refactor(*tangent_.matrix, context);
+  else
+    tangent_.factor.emplace(*tangent_.matrix, context);
+  tangent_.single.emplace(*tangent_.factor);
+  tangent_.held = *held_;
+}
+
+MotionQuick::Past MotionQuick::past() const {
+  return {.step = step_,
+          .held = held_,
+          .tangent = tangent_.taken ? tangent_.matrix : nullptr,
+          .tangent_version = tangent_.version,
+          .secants = secants_,
+          .rate = rate_};
+}
+
+void MotionQuick::restore(const Past& past, const MotionBody& body, const MotionSprings& springs,
+                          const SolidMotionOptions& options, const Context& context) {
+  drop_tangent();
+  if (past.step > 0)
+    (void)prepare(body, springs, *past.held, past.step, options, context);
+  else
+    step_ = 0;
+  if (past.tangent) {
+    if (!(tangent_.factor && tangent_.held == *held_))
+      tangent_.axes = solid_stiffness(body.mesh, body.elements, *held_, context);
+    const bool same = past.tangent_version == tangent_.version && tangent_.held == *held_;
+    tangent_.version = 0; // should it fail
+    tangent_.matrix = past.tangent;
+    if (!same)
+      factorise_tangent(context);
+    tangent_.taken = true;
+    tangent_.version = version_ = past.tangent_version;
+  }
+  secants_ = past.secants;
+  rate_ = past.rate;
 }
 
 void MotionQuick::drop_tangent() noexcept {
@@ -116,7 +153,7 @@ void MotionQuick::drop_tangent() noexcept {
 void MotionQuick::turn(SolidEnergy& energy, const Context& context) {
   if (all_still_)
     return;
-  rotations_.resize(3 * held_.size());
+  rotations_.resize(3 * held_->size());
   energy.node_rotations(rotations_, context);
   for (std::size_t i = 0; i < still_.size(); ++i)
     if (still_[i] != 0)
@@ -203,7 +240,7 @@ void MotionQuick::fill(MotionVolumes& volumes, const Context& context) {
 
 void MotionQuick::unit_responses(std::span<const std::size_t> axes,
                                  std::span<double> columns) const {
-  const std::size_t size = held_.size();
+  const std::size_t size = held_->size();
   if (tangent_.taken) {
     solve_unit_axes(tangent_.axes, *tangent_.factor, axes, columns);
   } else if (alike_) {

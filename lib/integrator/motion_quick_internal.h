@@ -2,6 +2,7 @@
 // The constant matrix of the quick way of integrator/solid_motion.h.
 
 #include "base/context.h"
+#include "base/copy_on_write.h"
 #include "integrator/motion_body_internal.h"
 #include "integrator/motion_objective_internal.h"
 #include "integrator/secants_internal.h"
@@ -12,6 +13,7 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <memory>
 #include <optional>
 #include <span>
 #include <vector>
@@ -28,6 +30,20 @@ struct MotionScratch {
 /// stand in the frames, where they hold on as the body turns.
 class MotionQuick {
 public:
+  /// What the next step depends on, without factors. Copies share the numbers.
+  struct Past {
+    double step = 0; ///< of the matrix; 0: there is none
+    CopyOnWrite<std::vector<std::uint8_t>> held{};
+    std::shared_ptr<const StiffnessMatrix> tangent{}; ///< of springs, in place of their bound
+    std::uint64_t tangent_version = 0;
+    Secants secants{};
+    double rate = 1;
+  };
+  Past past() const;
+  /// \throw as prepare
+  void restore(const Past& past, const MotionBody& body, const MotionSprings& springs,
+               const SolidMotionOptions& options, const Context& context);
+
   /// For a step of h; returns how many factors had to be made. \throw as Factor
   int prepare(const MotionBody& body, const MotionSprings& springs,
               const std::vector<std::uint8_t>& held, double h, const SolidMotionOptions& options,
@@ -74,7 +90,8 @@ public:
 private:
   std::uint64_t version_ = 0;
   double step_ = 0;
-  std::vector<std::uint8_t> held_, still_; ///< axes; nodes whose frames don't turn
+  CopyOnWrite<std::vector<std::uint8_t>> held_; ///< axes
+  std::vector<std::uint8_t> still_;             ///< nodes whose frames don't turn
   bool all_still_ = false;
   bool stiffness_is_bound_ = false; ///< there are springs and no elements
   bool alike_ = false;              ///< the matrix is of nodes, and serves each axis
@@ -86,9 +103,12 @@ private:
     bool taken = false;
     std::vector<std::uint8_t> held;
     StiffnessMatrix axes;
+    std::shared_ptr<const StiffnessMatrix> matrix; ///< of the factor
+    std::uint64_t version = 0;
     std::optional<Factor> factor;
     std::optional<SingleFactor> single;
   } tangent_;
+  void factorise_tangent(const Context& context);
   void solve_constant(Numbers& v, const Context& context);
 
   const MotionVolumes* filled_ = nullptr;

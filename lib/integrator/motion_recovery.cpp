@@ -1,5 +1,6 @@
 #include "integrator/motion_recovery_internal.h"
 
+#include "base/unique_number.h"
 #include "fem/assembly_blocks.h"
 #include "geometry/vector_at.h"
 #include "tetrahedra/tet_mesh.h"
@@ -112,9 +113,62 @@ void MotionRecovery::look(const MotionBody& body, const MotionState& state, doub
       loosen(body, state, elastic, options, context);
     return;
   }
-  soft_ = std::move(soft);
+  begin(std::move(soft), SolidLaw::corotational);
   kept_ = more;
   stood_at_ = 0;
+}
+
+void MotionRecovery::begin(SolidMotion&& soft, SolidLaw law) {
+  soft_ = std::move(soft);
+  law_ = law;
+  number_ = unique_number();
+}
+
+/// The mesh with the material of loose elements.
+TetMesh MotionRecovery::loosened(const MotionBody& body,
+                                 const std::vector<std::uint8_t>& loose) const {
+  TetMesh mesh = body.mesh;
+  if (loose.empty())
+    return mesh;
+  mesh.material.resize(loose.size());
+  for (std::size_t t = 0; t < loose.size(); ++t)
+    if (loose[t] != 0)
+      mesh.material[t] += static_cast<std::int32_t>(materials_.size() / 2);
+  return mesh;
+}
+
+MotionRecovery::Past MotionRecovery::past() const {
+  Past past{.number = number_,
+            .law = law_,
+            .kept = kept_,
+            .stood_at = stood_at_,
+            .standing = standing_,
+            .loose = loose_,
+            .steps_standing = steps_standing_};
+  if (!on())
+    return past;
+  past.soft = soft_->past();
+  past.place.assign(soft_->places().begin(), soft_->places().end());
+  past.velocity.assign(soft_->velocity().begin(), soft_->velocity().end());
+  return past;
+}
+
+void MotionRecovery::restore(const Past& past, const MotionBody& body, const MotionState& state,
+                             const SolidMotionOptions& options, const Context& context) {
+  kept_ = past.kept;
+  stood_at_ = past.stood_at;
+  standing_ = past.standing;
+  loose_ = past.loose;
+  steps_standing_ = past.steps_standing;
+  if (!past.soft) {
+    end();
+    return;
+  }
+  if (!on() || number_ != past.number) {
+    begin(make(body, state, loosened(body, loose_), past.law, options, context), past.law);
+    number_ = past.number;
+  }
+  soft_->restore(past.place, past.velocity, state.held, *past.soft, context);
 }
 
 /// Whether it does, with this energy, a step of h ahead.
@@ -138,11 +192,7 @@ void MotionRecovery::loosen(const MotionBody& body, const MotionState& state, do
   std::vector<std::uint8_t> loose = around_inside_out(body, state.place);
   if (loose == loose_)
     return;
-  TetMesh mesh = body.mesh;
-  mesh.material.resize(loose.size());
-  for (std::size_t t = 0; t < loose.size(); ++t)
-    if (loose[t] != 0)
-      mesh.material[t] += static_cast<std::int32_t>(materials_.size() / 2);
+  const TetMesh mesh = loosened(body, loose);
   for (const SolidLaw law : {SolidLaw::corotational, SolidLaw::hyperelastic}) {
     if (law == SolidLaw::corotational && !mesh.middles.empty())
       continue;
@@ -150,7 +200,7 @@ void MotionRecovery::loosen(const MotionBody& body, const MotionState& state, do
     const double kept = elastic - soft.elastic_energy();
     if (!(kept >= 0))
       continue;
-    soft_ = std::move(soft);
+    begin(std::move(soft), law);
     kept_ = kept;
     loose_ = std::move(loose);
     return;

@@ -23,6 +23,7 @@
 #include "integrator/solid_motion.h"
 
 #include <cstdint>
+#include <memory>
 #include <optional>
 #include <span>
 #include <vector>
@@ -31,6 +32,21 @@ namespace gewebe {
 
 class MotionRecovery {
 public:
+  /// What the next step depends on.
+  struct Past {
+    std::shared_ptr<const SolidMotion::Past> soft{}; ///< null: it isn't on
+    Numbers place{}, velocity{};                     ///< of the soft body
+    std::uint64_t number = 0;                        ///< of the soft body
+    SolidLaw law = SolidLaw::corotational;           ///< and its law
+    double kept = 0, stood_at = 0, standing = 0;
+    std::vector<std::uint8_t> loose{};
+    int steps_standing = 0;
+  };
+  Past past() const;
+  /// \throw as SolidMotion
+  void restore(const Past& past, const MotionBody& body, const MotionState& state,
+               const SolidMotionOptions& options, const Context& context);
+
   /// There is none of what Newton's method moves, and of what has springs or encloses something.
   MotionRecovery(const MotionBody& body, std::span<const SolidMaterial> materials,
                  const SolidNet& net, const SolidMotionOptions& options);
@@ -54,11 +70,15 @@ private:
   void loosen(const MotionBody& body, const MotionState& state, double elastic,
               const SolidMotionOptions& options, const Context& context);
   bool stands(double elastic, double h);
+  TetMesh loosened(const MotionBody& body, const std::vector<std::uint8_t>& loose) const;
+  void begin(SolidMotion&& soft, SolidLaw law);
 
   /// Those of the mesh, then as many for what is loosened; empty: there is no recovery.
   std::vector<SolidMaterial> materials_;
   double worth_looking_ = 0; ///< energy
   std::optional<SolidMotion> soft_;
+  std::uint64_t number_ = 0; ///< of soft_, see base/unique_number.h
+  SolidLaw law_ = SolidLaw::corotational;
   double kept_ = 0;
   std::vector<std::uint8_t> loose_; ///< by tetrahedron; empty: none yet
 

@@ -79,7 +79,7 @@ MotionSprings::MotionSprings(std::span<const SolidSpring> springs)
   }
   i_.resize(whole);
   j_.resize(whole);
-  for (Numbers* const column : {&stiffness_, &damping_, &rest_, &lengths_, &kept_})
+  for (Numbers* const column : {&stiffness_, &damping_, &rest_, &lengths_, &kept_.write()})
     column->resize(whole);
 }
 
@@ -87,7 +87,7 @@ double MotionSprings::evaluate(const Numbers& at, double per_time, std::span<dou
                                const Context& context) {
   SpringEnergies energies;
   motion_kernel(context.cpu)
-      .pull({i_.data(), j_.data(), stiffness_.data(), damping_.data(), rest_.data(), kept_.data(),
+      .pull({i_.data(), j_.data(), stiffness_.data(), damping_.data(), rest_.data(), kept_->data(),
              lengths_.data(), springs_.size()},
             at.data(), per_time, forces.data(), energies);
   elastic_ = energies.elastic;
@@ -109,8 +109,8 @@ StiffnessMatrix MotionSprings::with_tangent(const StiffnessMatrix& of_elements, 
     const Vec3 d = vector_at(at, s.j) - vector_at(at, s.i);
     const double length = norm(d), along = s.stiffness + s.damping * per_time;
     const Vec3 n = length > 0 ? d / length : Vec3{};
-    const double pull =
-                     s.stiffness * (length - s.rest) + s.damping * per_time * (length - kept_[k]),
+    const double pull = s.stiffness * (length - s.rest) +
+                        s.damping * per_time * (length - (*kept_)[k]),
                  across = length > 0 ? std::max(0.0, pull / length) : along;
     std::array<double, 9> block{};
     for (int a = 0; a < 3; ++a)

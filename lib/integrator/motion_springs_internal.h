@@ -6,12 +6,14 @@
 // turns as a whole.
 
 #include "base/context.h"
+#include "base/copy_on_write.h"
 #include "integrator/motion_numbers_internal.h"
 #include "integrator/solid_motion.h"
 #include "linalg/stiffness.h"
 
 #include <cstdint>
 #include <span>
+#include <utility>
 #include <vector>
 
 namespace gewebe {
@@ -27,7 +29,10 @@ public:
                   const Context& context);
   double elastic() const noexcept { return elastic_; } ///< in the last evaluation
   /// Dampers count from the last evaluation on.
-  void keep() { kept_ = lengths_; }
+  void keep() { kept_.replace() = lengths_; }
+  /// Lengths that dampers count from.
+  const CopyOnWrite<Numbers>& kept() const noexcept { return kept_; }
+  void restore(CopyOnWrite<Numbers> kept) { kept_ = std::move(kept); }
 
   /// A matrix plus that of the springs with all they have along every axis, whatever their
   /// direction: it bounds their tangent wherever they turn to.
@@ -39,7 +44,8 @@ public:
 private:
   std::vector<SolidSpring> springs_;
   std::vector<std::uint32_t> i_, j_; ///< of springs, by columns, whole batches of SpringColumns
-  Numbers stiffness_, damping_, rest_, lengths_, kept_;
+  Numbers stiffness_, damping_, rest_, lengths_;
+  CopyOnWrite<Numbers> kept_;
   double elastic_ = 0;
 };
 

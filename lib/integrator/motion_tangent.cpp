@@ -141,29 +141,44 @@ void MotionTangent::make(const MotionObjective& objective, const Numbers& at, bo
           turned(static_cast<Eigen::Index>(n / 3), static_cast<Eigen::Index>(n % 3)) + block[n];
     return block;
   };
-  tangent_ = assembled_matrix(body.mesh, block_of, objective.state().held, context);
+  StiffnessMatrix tangent = assembled_matrix(body.mesh, block_of, objective.state().held, context);
   if (!energy.springs().empty())
-    tangent_ = energy.springs().with_tangent(tangent_, at, 1 / objective.step());
-  add_masses(body, objective.step(), tangent_);
-  if (factor_ && factor_->order() == tangent_.order() && !renewed_) {
-    factor_->refactor(tangent_, context);
-  } else {
-    factor_.reset();
-    factor_.emplace(tangent_, context);
-  }
-  renewed_ = false;
+    tangent = energy.springs().with_tangent(tangent, at, 1 / objective.step());
+  add_masses(body, objective.step(), tangent);
+  tangent_ = std::make_shared<const StiffnessMatrix>(std::move(tangent));
+  factorise(context);
   made_ = true;
   version_ = unique_number();
 }
 
+void MotionTangent::factorise(const Context& context) {
+  if (factor_ && factor_->order() == tangent_->order() && !renewed_) {
+    factor_->refactor(*tangent_, context);
+  } else {
+    factor_.reset();
+    factor_.emplace(*tangent_, context);
+  }
+  renewed_ = false;
+}
+
+void MotionTangent::restore(const Past& past, const Context& context) {
+  const bool same = made_ && past.version == version_;
+  tangent_ = past.matrix;
+  version_ = past.version;
+  made_ = past.made;
+  renewed_ = true;
+  if (made_ && !same)
+    factorise(context);
+}
+
 void MotionTangent::unit_responses(std::span<const std::size_t> axes,
                                    std::span<double> columns) const {
-  solve_unit_axes(tangent_, *factor_, axes, columns);
+  solve_unit_axes(*tangent_, *factor_, axes, columns);
 }
 
 void MotionTangent::solve(Numbers& v) const {
   const Numbers f = v;
-  solve_axes(tangent_, *factor_, f, v);
+  solve_axes(*tangent_, *factor_, f, v);
 }
 
 } // namespace gewebe

@@ -8,6 +8,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <memory>
 #include <optional>
 #include <span>
 #include <vector>
@@ -16,6 +17,16 @@ namespace gewebe {
 
 class MotionTangent {
 public:
+  /// The matrix without its factor, which is made again where it is another one's. Copies share it.
+  struct Past {
+    std::shared_ptr<const StiffnessMatrix> matrix;
+    std::uint64_t version = 0;
+    bool made = false;
+  };
+  Past past() const { return {tangent_, version_, made_}; }
+  /// \throw as Factor
+  void restore(const Past& past, const Context& context);
+
   /// Other axes are held.
   void renew() noexcept { renewed_ = true; }
   bool is_made() const noexcept { return made_; }
@@ -35,7 +46,9 @@ private:
 
   bool renewed_ = true, made_ = false;
   std::uint64_t version_ = 0;
-  StiffnessMatrix tangent_;
+  void factorise(const Context& context);
+
+  std::shared_ptr<const StiffnessMatrix> tangent_;
   std::optional<Factor> factor_;
 };
 

@@ -11,7 +11,7 @@ namespace gewebe {
 void Secants::drop(std::size_t oldest) {
   for (std::size_t k = 0; k + oldest < count_; ++k) {
     std::swap(pairs_[k], pairs_[k + oldest]);
-    Parts& by = pairs_[k].by_older;
+    Parts& by = by_older_[k] = by_older_[k + oldest];
     std::shift_left(by.begin(), by.end(), static_cast<std::ptrdiff_t>(oldest));
   }
   count_ -= oldest;
@@ -25,7 +25,9 @@ void Secants::forget_earlier() {
 void Secants::add(const Numbers& moved, const Numbers& turned, const Context& context) {
   if (count_ == most)
     drop(1);
-  Pair& pair = pairs_[count_];
+  if (pairs_[count_].use_count() != 1)
+    pairs_[count_] = std::make_shared<Pair>();
+  Pair& pair = *pairs_[count_];
   pair.moved.resize(moved.size());
   pair.turned.resize(moved.size());
   const MotionKernel& kernel = motion_kernel(context.cpu);
@@ -37,12 +39,12 @@ void Secants::add(const Numbers& moved, const Numbers& turned, const Context& co
         }
         for (std::size_t k = 0; k <= count_; ++k)
           products[k] =
-              kernel.product(pairs_[k].moved.data() + begin, turned.data() + begin, end - begin);
+              kernel.product(pairs_[k]->moved.data() + begin, turned.data() + begin, end - begin);
       });
   if (!(sums[count_] > 0 && std::isfinite(sums[count_])))
     return;
   pair.over = 1 / sums[count_];
-  pair.by_older = sums;
+  by_older_[count_] = sums;
   ++count_;
 }
 
@@ -55,16 +57,16 @@ Secants::Parts Secants::remove(Numbers& gradient, const Context& context) const 
       context, gradient.size(), [&](std::size_t begin, std::size_t end, Parts& products) {
         for (std::size_t k = 0; k < count_; ++k)
           products[k] =
-              kernel.product(pairs_[k].moved.data() + begin, gradient.data() + begin, end - begin);
+              kernel.product(pairs_[k]->moved.data() + begin, gradient.data() + begin, end - begin);
       });
   for (std::size_t k = count_; k-- > 0;) {
     for (std::size_t newer = k + 1; newer < count_; ++newer)
-      parts[k] -= parts[newer] * pairs_[newer].by_older[k];
-    parts[k] *= pairs_[k].over;
+      parts[k] -= parts[newer] * by_older_[newer][k];
+    parts[k] *= pairs_[k]->over;
   }
   parallel_blocks(context, gradient.size(), axes_grain, [&](std::size_t begin, std::size_t end) {
     for (std::size_t k = count_; k-- > 0;)
-      kernel.increase(gradient.data() + begin, -parts[k], pairs_[k].turned.data() + begin,
+      kernel.increase(gradient.data() + begin, -parts[k], pairs_[k]->turned.data() + begin,
                       end - begin);
   });
   return parts;
@@ -78,17 +80,17 @@ void Secants::restore(const Parts& first, Numbers& direction, const Context& con
   Parts parts = sums_of_axes<most>(
       context, direction.size(), [&](std::size_t begin, std::size_t end, Parts& products) {
         for (std::size_t k = 0; k < count_; ++k)
-          products[k] = kernel.product(pairs_[k].turned.data() + begin, direction.data() + begin,
+          products[k] = kernel.product(pairs_[k]->turned.data() + begin, direction.data() + begin,
                                        end - begin);
       });
   for (std::size_t k = 0; k < count_; ++k) {
     for (std::size_t older = 0; older < k; ++older)
-      parts[k] += parts[older] * pairs_[k].by_older[older];
-    parts[k] = first[k] - pairs_[k].over * parts[k];
+      parts[k] += parts[older] * by_older_[k][older];
+    parts[k] = first[k] - pairs_[k]->over * parts[k];
   }
   parallel_blocks(context, direction.size(), axes_grain, [&](std::size_t begin, std::size_t end) {
     for (std::size_t k = 0; k < count_; ++k)
-      kernel.increase(direction.data() + begin, parts[k], pairs_[k].moved.data() + begin,
+      kernel.increase(direction.data() + begin, parts[k], pairs_[k]->moved.data() + begin,
                       end - begin);
   });
 }

@@ -5,6 +5,7 @@
 
 #include <array>
 #include <cstddef>
+#include <memory>
 #include <vector>
 
 namespace gewebe {
@@ -12,6 +13,7 @@ namespace gewebe {
 /// What L-BFGS knows of rounds (Nocedal, Wright, Numerical optimization, 2006, 7.2), in single
 /// precision. Products of pairs with each other are kept, so that a direction takes four passes
 /// over them and no more (Byrd, Nocedal, Schnabel, Representations of quasi-Newton matrices, 1994).
+/// A copy shares the pairs, which are not written again.
 class Secants {
 public:
   void clear() { count_ = earlier_ = 0; }
@@ -34,13 +36,13 @@ private:
   struct Pair {
     std::vector<float> moved, turned; ///< of places, of gradients
     double over = 0;
-    Parts by_older{}; ///< products of `turned` with `moved` of those before
   };
   Parts remove(Numbers& gradient, const Context& context) const;
   void restore(const Parts& first, Numbers& direction, const Context& context) const;
   void drop(std::size_t oldest);
 
-  std::array<Pair, most> pairs_; ///< the first `count_`, ascending
+  std::array<std::shared_ptr<Pair>, most> pairs_; ///< the first `count_`, ascending
+  std::array<Parts, most> by_older_{}; ///< of each, products of `turned` with `moved` before it
   std::size_t count_ = 0, earlier_ = 0;
 };
 

@@ -26,8 +26,8 @@ SolidEnergy::SolidEnergy(const MotionBody& body, const SolidNet& net,
   if (law_ != SolidLaw::hyperelastic)
     return;
   if (!body.mesh.middles.empty())
-    bubbles_.resize(body.elements.size());
-  new_bubbles_ = bubbles_;
+    bubbles_.write().resize(body.elements.size());
+  new_bubbles_ = *bubbles_;
   for (const SolidElement& e : body.elements)
     unsure_at_rest_ += 1e-14 * e.material.mu * e.volume;
 }
@@ -35,12 +35,20 @@ SolidEnergy::SolidEnergy(const MotionBody& body, const SolidNet& net,
 void SolidEnergy::keep() {
   frames_.remember();
   springs_.keep();
-  bubbles_ = new_bubbles_;
+  if (!new_bubbles_.empty())
+    bubbles_.replace() = new_bubbles_;
+}
+
+void SolidEnergy::restore(const KeptStep& kept) {
+  frames_.restore_strains(kept.strains);
+  springs_.restore(kept.lengths);
+  bubbles_ = kept.bubbles;
 }
 
 void SolidEnergy::forget_bubbles() {
-  std::ranges::fill(bubbles_, Vec3{});
-  new_bubbles_ = bubbles_;
+  std::ranges::fill(new_bubbles_, Vec3{});
+  if (!new_bubbles_.empty())
+    bubbles_.replace() = new_bubbles_;
 }
 
 double SolidEnergy::hyperelastic(const Numbers& at, std::span<double> forces,
@@ -56,7 +64,7 @@ double SolidEnergy::hyperelastic(const Numbers& at, std::span<double> forces,
       Vec3 bubble;
       if (count == 10)
         bubble = new_bubbles_[t] =
-            settled_bubble(body_.elements[t], u, (at_rest_ ? new_bubbles_ : bubbles_)[t]);
+            settled_bubble(body_.elements[t], u, (at_rest_ ? new_bubbles_ : *bubbles_)[t]);
       hyperelastic_response(body_.elements[t], std::span(u).first(count), bubble,
                             HyperelasticPart::force, response);
       energy[t] = response.energy;

@@ -2,6 +2,7 @@
 // The energy of a body's elements by either law, and damping, for integrator/solid_motion.h.
 
 #include "base/context.h"
+#include "base/copy_on_write.h"
 #include "fem/corotational.h"
 #include "integrator/motion_body_internal.h"
 #include "integrator/motion_springs_internal.h"
@@ -10,6 +11,7 @@
 
 #include <array>
 #include <cstddef>
+#include <memory>
 #include <span>
 #include <vector>
 
@@ -19,6 +21,13 @@ namespace gewebe {
 struct StepDamping {
   double by_strain = 0; ///< times the energy of what strains changed by
   double per_time = 0;  ///< 1/h, for dampers of springs
+};
+
+/// What an energy keeps of the last step. Copies share it.
+struct KeptStep {
+  std::shared_ptr<const void> strains;
+  CopyOnWrite<Numbers> lengths;
+  CopyOnWrite<std::vector<Vec3>> bubbles;
 };
 
 class SolidEnergy {
@@ -35,6 +44,8 @@ public:
   /// Strains and bubbles of the last evaluation are kept: damping counts from the ones, bubbles
   /// are sought from the others.
   void keep();
+  KeptStep kept() const { return {frames_.strains(), springs_.kept(), bubbles_}; }
+  void restore(const KeptStep& kept);
   /// Bubbles are sought from rest.
   void forget_bubbles();
   /// At rest bubbles are sought from those of the last evaluation: there is no step to begin again.
@@ -67,8 +78,9 @@ private:
   SolidLaw law_;
   MotionSprings springs_;
   MotionVolumes volumes_;
-  CorotationalSolid frames_;                ///< and corotational energy, and damping
-  std::vector<Vec3> bubbles_, new_bubbles_; ///< of quadratic Neo-Hookean elements
+  CorotationalSolid frames_;               ///< and corotational energy, and damping
+  CopyOnWrite<std::vector<Vec3>> bubbles_; ///< of quadratic Neo-Hookean elements
+  std::vector<Vec3> new_bubbles_;
   bool at_rest_ = false;
   double elastic_ = 0, unsure_at_rest_ = 0;
 };

@@ -792,6 +792,51 @@ void SolidMotion::restore(std::span<const double> places, std::span<const double
   s.energy.keep();
 }
 
+struct SolidMotion::Past {
+  KeptStep energy;
+  double elastic = 0, last_step = 0;
+  MotionForecast forecast;
+  MotionQuick::Past quick;
+  std::optional<MotionTangent::Past> tangent; ///< if it serves on
+  MotionRecovery::Past recovery;
+};
+
+std::shared_ptr<const SolidMotion::Past> SolidMotion::past() const {
+  const State& s = *state_;
+  auto past = std::make_shared<Past>(Past{.energy = s.energy.kept(),
+                                          .elastic = s.elastic,
+                                          .last_step = s.last_step,
+                                          .forecast = s.forecast,
+                                          .quick = s.quick.past(),
+                                          .tangent = {},
+                                          .recovery = s.recovery.past()});
+  if (s.keeps_tangent)
+    past->tangent = s.tangent.past();
+  return past;
+}
+
+void SolidMotion::restore(std::span<const double> places, std::span<const double> velocity,
+                          std::span<const std::uint8_t> held, const Past& past,
+                          const Context& context) {
+  State& s = *state_;
+  s.open.reset();
+  s.moved = false;
+  std::ranges::copy(places, s.now.place.begin());
+  std::ranges::copy(velocity, s.now.velocity.begin());
+  std::ranges::copy(held, s.now.held.begin());
+  s.energy.restore(past.energy);
+  s.elastic = past.elastic;
+  s.last_step = past.last_step;
+  s.forecast = past.forecast;
+  s.quick.restore(past.quick, s.body, s.energy.springs(), s.options, context);
+  s.keeps_tangent = past.tangent.has_value();
+  if (past.tangent)
+    s.tangent.restore(*past.tangent, context);
+  else
+    s.tangent.renew();
+  s.recovery.restore(past.recovery, s.body, s.now, s.options, context);
+}
+
 void SolidMotion::find_reactions(const Context& context) {
   State& s = *state_;
   if (s.recovery.on()) {

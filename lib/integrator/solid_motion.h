@@ -171,6 +171,14 @@ public:
   /// As set_state, with the places of nodes, as places() and velocity() told them: to the bit.
   void restore(std::span<const double> places, std::span<const double> velocity,
                const Context& context = {});
+  /// What earlier steps leave to the next ones, beside places and velocities: secants,
+  /// accelerations, strains that damping counts from, whether a tangent serves on. Copies share it.
+  struct Past;
+  std::shared_ptr<const Past> past() const;
+  /// Goes back: the next steps are, to the bit, those that followed past(). Factors that have
+  /// changed since are made again. \param places, velocity, held  of that time \throw as Factor
+  void restore(std::span<const double> places, std::span<const double> velocity,
+               std::span<const std::uint8_t> held, const Past& past, const Context& context);
   /// From now on reactions() are those of the state as it stands still, until the next step.
   void find_reactions(const Context& context = {});
 

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <array>
 #include <memory>
+#include <utility>
 
 namespace gewebe {
 
@@ -19,6 +20,16 @@ FrontalFactor::FrontalFactor(const Model& model, const Context& context)
 FrontalFactor::FrontalFactor(const NodeMatrix& matrix, const Context& context)
     : state_(std::make_unique<State>()) {
   state_->begin({.matrix = &matrix}, context);
+}
+
+FrontalFactor::FrontalFactor(const Model& model, FrontTree tree, const Context& context)
+    : state_(std::make_unique<State>()) {
+  state_->begin({.model = &model}, std::move(tree), context);
+}
+
+FrontalFactor::FrontalFactor(const NodeMatrix& matrix, FrontTree tree, const Context& context)
+    : state_(std::make_unique<State>()) {
+  state_->begin({.matrix = &matrix}, std::move(tree), context);
 }
 
 FrontalFactor::~FrontalFactor() = default;
@@ -36,6 +47,10 @@ FrontalWork FrontalFactor::refactor(const NodeMatrix& matrix, std::span<const st
                                     std::span<const std::uint32_t> rows, const Context& context) {
   state_->refactor({.matrix = &matrix}, origin, place, rows, context);
   return state_->work;
+}
+
+const FrontTree& FrontalFactor::tree() const noexcept {
+  return state_->tree;
 }
 
 std::size_t FrontalFactor::axes() const noexcept {

@@ -8,6 +8,7 @@
 // the root of the tree. Memory is about three times that of the factor alone.
 
 #include "base/context.h"
+#include "cholesky/front_tree.h"
 #include "cholesky/multifrontal.h"
 #include "linalg/node_matrix.h"
 #include "model/model.h"
@@ -32,6 +33,9 @@ public:
   FrontalFactor(const Model& model, const Context& context);
   /// The same of a matrix, such as a solid's. \throw as above
   FrontalFactor(const NodeMatrix& matrix, const Context& context);
+  /// The factor with a tree that another one of this matrix had: with its bits. \throw as above
+  FrontalFactor(const Model& model, FrontTree tree, const Context& context);
+  FrontalFactor(const NodeMatrix& matrix, FrontTree tree, const Context& context);
   ~FrontalFactor();
   FrontalFactor(FrontalFactor&&) noexcept;
   FrontalFactor& operator=(FrontalFactor&&) noexcept;
@@ -51,6 +55,7 @@ public:
                        std::span<const std::uint32_t> place, std::span<const std::uint32_t> rows,
                        const Context& context);
 
+  const FrontTree& tree() const noexcept;
   std::size_t axes() const noexcept;    ///< 3 n
   std::size_t entries() const noexcept; ///< doubles in L
   const FrontalWork& work() const noexcept;

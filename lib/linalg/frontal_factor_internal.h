@@ -125,6 +125,8 @@ struct FrontalFactor::State {
 
   /// All anew, in an order of its own finding.
   void begin(const Source& k, const Context& context);
+  /// Computes all fronts of this tree.
+  void begin(const Source& k, FrontTree with, const Context& context);
 
   // ---- a load that is carried along, see FrontalFactor::carry
 

@@ -7,6 +7,7 @@
 #include "linalg/frontal_factor_internal.h"
 
 #include <algorithm>
+#include <utility>
 
 // Based on: Liu, The multifrontal method for sparse matrix solution: theory and practice, 1992.
 
@@ -193,12 +194,17 @@ void FrontalFactor::State::remember(const Source& k) {
 }
 
 void FrontalFactor::State::begin(const Source& k, const Context& context) {
-  cpu = context.cpu;
-  graph = k.graph();
-  const std::vector<std::uint32_t> order = elimination_order(graph.view());
+  const SpringGraph of = k.graph();
+  const std::vector<std::uint32_t> order = elimination_order(of.view());
   if (order.empty())
     throw Error("every node is fixed along every axis, expected a node that can move");
-  tree = front_tree(graph.view(), order);
+  begin(k, front_tree(of.view(), order), context);
+}
+
+void FrontalFactor::State::begin(const Source& k, FrontTree with, const Context& context) {
+  cpu = context.cpu;
+  graph = k.graph();
+  tree = std::move(with);
   fronts = std::vector<Front>(tree.fronts());
   loads.clear();
   factorise(k, {}, context);

@@ -126,7 +126,6 @@ void load_body(const World& w, Body& body) {
     add(object.load->ramp, load.ramp);
     load.gravity = object.load->gravity;
   }
-  body.ahead = true;
   body.moving->set_load(load, w.now.clock.time);
   body.changed = false;
 }
@@ -311,7 +310,6 @@ void advance_freely(World& w, std::span<Body* const> bodies, double to) {
   for (Body* const body : bodies) {
     if (body->moving->resting())
       continue;
-    body->ahead = true;
     body->rest_extents.clear();
     awake.push_back(body);
     step.push_back(integration_step(w, *body));

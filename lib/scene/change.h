@@ -137,11 +137,6 @@ struct SetMethod {
   std::size_t object = 0;
   Method method = Method::ela;
 };
-/// Drops caches (factors, columns, running sums). The next shape is computed from the load or the
-/// state of motion only.
-struct Renew {
-  std::size_t object = 0;
-};
 /// Computes in advance the data that the first contact, or the first cut, of an elastostatic object
 /// needs, and the data for contacts at the given nodes.
 struct Prepare {
@@ -178,7 +173,7 @@ struct Restore {
 using Change =
     std::variant<SetForce, SetPressure, SetMass, SetDisplacement, Attach, Release, SetInstrument,
                  MoveInstrument, SetCoupling, Grasp, Withdraw, SetContact, SetGravity, SetTimestep,
-                 SetTwoStep, SetWarp, Emit, SetMethod, Renew, Prepare, CutObject, SetTear, Restore>;
+                 SetTwoStep, SetWarp, Emit, SetMethod, Prepare, CutObject, SetTear, Restore>;
 
 /// Columns of a log row that only instruments have. What does not apply stays empty.
 struct InstrumentRow {

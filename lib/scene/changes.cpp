@@ -63,8 +63,7 @@ void apply(World& w, const Change& change) {
         Rule<Kind>::require(w, c);
         const auto work = [&] {
           Rule<Kind>::enter(w, c);
-          if constexpr (Rule<Kind>::is_moment)
-            note_poses(w); // the end of the ways so far
+          note_poses(w); // the end of the ways so far
           Rule<Kind>::apply(w, c);
         };
         if constexpr (Rule<Kind>::may_fail)
@@ -245,13 +244,6 @@ void Rule<Emit>::log(const World&, const Emit& c, ChangeRow& row) {
              : c.forces    ? "forces"
              : c.surfaces  ? "surfaces"
                            : "shapes";
-}
-
-void Rule<Renew>::apply(World& w, const Renew& c) {
-  Object& object = w.now.objects.at(c.object);
-  object.statics->ahead = true;
-  renew(object); // as in a rollback: the last result of large rotations stays
-  touch(object);
 }
 
 } // namespace gewebe::simulation

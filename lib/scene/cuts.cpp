@@ -25,39 +25,40 @@ namespace {
 constexpr double largest_turn = 0.1; ///< between two edges of a swept area, about its angle
 
 /// Stiffness of an elastostatic object that is updated after cuts; null if no solution was needed
-/// so far, or lately. The object after the cut takes it over. A rollback of a cut drops it.
-CutStiffness* stiffness_of(World& w, Object& object) {
-  if (object.statics->stiffness || (!object.statics->made() && !has_moved(w, object)))
-    return object.statics->stiffness.get();
-  object.statics->ahead = true;
+/// so far, or lately. The object after the cut takes it over.
+const CutStiffness* stiffness_of(World& w, Object& object) {
+  if (object.statics.stiffness || (!object.statics.made() && !has_moved(w, object)))
+    return object.statics.stiffness.get();
   const std::shared_ptr<const Model> first =
       object.cut.first ? object.cut.first : object.matter->model;
   std::shared_ptr<ComplianceSource> source;
   if (object.matter->source.stiffness)
     source = object.matter->source.stiffness(*first);
-  auto stiffness = std::make_unique<CutStiffness>(first, std::move(source), w.context);
+  auto stiffness = std::make_shared<CutStiffness>(first, std::move(source), w.context);
   if (object.cut.first)
     (void)stiffness->cut(object.matter->model, *object.cut.first_nodes, *object.cut.places);
-  object.statics->stiffness = std::move(stiffness);
-  return object.statics->stiffness.get();
+  object.statics.stiffness = std::move(stiffness);
+  return object.statics.stiffness.get();
 }
 
 /// Of a cut model, from the object as it was before; nothing: K is factorised when it is needed.
 /// Nodes of the object may be gone with a part (CutModel::place).
 std::shared_ptr<ComplianceSource>
 cut_source(World& w, Object& object, std::shared_ptr<const Model> next, const CutModel& cut) {
-  CutStiffness* const stiffness = stiffness_of(w, object);
-  if (stiffness == nullptr)
+  const CutStiffness* const before = stiffness_of(w, object);
+  if (before == nullptr)
     return nullptr;
   try {
+    auto stiffness = std::make_shared<CutStiffness>(*before);
     const CutWork work = stiffness->cut(std::move(next), cut.origin, cut.place);
     ++(work.way == CutWay::woodbury   ? w.now.counts.cut_woodbury
        : work.way == CutWay::refactor ? w.now.counts.cut_refactors
                                       : w.now.counts.cut_factors);
     w.now.counts.cut_unprepared += work.unprepared ? 1 : 0;
+    object.statics.stiffness = stiffness;
     return stiffness->compliance();
   } catch (...) {
-    object.statics->stiffness.reset();
+    object.statics.stiffness.reset();
     throw;
   }
 }
@@ -162,8 +163,6 @@ void carry_out(World& w, std::size_t index, CutModel cut) {
   std::shared_ptr<ComplianceSource> prepared;
   bool loose = !old.came.velocity.empty();
   if (ffe && !has_law(old)) {
-    if (old.statics->made() || old.statics->stiffness)
-      old.statics->ahead = true;
     try {
       prepared = cut_source(w, old, now, rest);
     } catch (const SingularStiffness&) {
@@ -175,8 +174,8 @@ void carry_out(World& w, std::size_t index, CutModel cut) {
   }
   std::deque<Object> pieces;
   Object& next = pieces.emplace_back(renumbered(old, now));
-  next.statics->stiffness = std::move(old.statics->stiffness);
-  next.statics->prepared = std::move(prepared);
+  next.statics.stiffness = std::move(old.statics.stiffness);
+  next.statics.prepared = std::move(prepared);
   follow_cut(w, old, rest.origin, next);
   next.cut = cut_again(old, rest.origin, moves);
   next.cut.scored = std::move(rest.left);
@@ -223,14 +222,17 @@ void announce_cut(World& w, std::size_t index) {
   if (object.method != Method::ffe || has_law(object) || gap_of(object, Feature::cut) != nullptr)
     return;
   try {
-    if (CutStiffness* const stiffness = stiffness_of(w, object); stiffness != nullptr)
+    if (const CutStiffness* const before = stiffness_of(w, object); before != nullptr) {
+      auto stiffness = std::make_shared<CutStiffness>(*before);
       stiffness->prepare();
+      object.statics.stiffness = std::move(stiffness);
+    }
   } catch (const Cancelled&) {
     throw;
   } catch (const std::bad_alloc&) {
     throw;
   } catch (...) { // a source may throw anything; it throws again where its result is needed
-    object.statics->stiffness.reset();
+    object.statics.stiffness.reset();
   }
 }
 
@@ -346,7 +348,7 @@ void require_held(World& w, Object& object) {
 /// shape then.
 void find_free_motion(World& w, std::size_t index) {
   Object& object = w.now.objects[index];
-  const Statics& statics = *object.statics;
+  const Statics& statics = object.statics;
   if (!object.cut.first || object.method != Method::ffe ||
       (statics.made() && !(statics.solver && statics.solver->is_free())) ||
       (object.load->empty() && !instruments_there(w)))

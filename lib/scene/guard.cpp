@@ -3,7 +3,6 @@
 #include "scene/world_internal.h"
 
 #include <cstddef>
-#include <memory>
 #include <utility>
 
 namespace gewebe::simulation {
@@ -16,53 +15,42 @@ void Body::restore(const Snapshot& was) {
   failure = nullptr;
 }
 
-Saved saved_now(const World& w) {
-  Saved saved{w.now, {}};
-  for (const auto& body : w.now.bodies)
-    saved.bodies.push_back(body->snapshot());
-  return saved;
+Statics::Past Statics::past() const {
+  return {.solver = solver ? solver->past() : nullptr,
+          .two_step = two_step ? two_step->past() : nullptr,
+          .warped = warped ? warped->answer() : nullptr,
+          .strained = strained ? strained->answer() : nullptr};
 }
 
-namespace {
+void Statics::restore(const Past& past) {
+  if (solver)
+    solver->restore(*past.solver);
+  if (two_step)
+    two_step->restore(*past.two_step);
+  if (warped)
+    warped->restore(past.warped);
+  if (strained)
+    strained->restore(past.strained);
+}
 
-/// The scene and its bodies.
-void put_back(World& w, Saved&& saved) {
-  w.now = std::move(saved.scene);
-  for (std::size_t k = 0; k < saved.bodies.size(); ++k)
-    w.now.bodies[k]->restore(saved.bodies[k]);
+Snapshot snapshot(const World& w) {
+  Snapshot snapshot{w.now, {}, {}};
+  for (const auto& body : w.now.bodies)
+    snapshot.bodies.push_back(body->snapshot());
+  for (const Object& object : w.now.objects)
+    snapshot.statics.push_back(object.statics.past());
+  return snapshot;
+}
+
+void roll_back(World& w, Snapshot&& snapshot) noexcept {
+  w.now = std::move(snapshot.scene);
+  for (std::size_t k = 0; k < snapshot.bodies.size(); ++k)
+    w.now.bodies[k]->restore(snapshot.bodies[k]);
+  for (std::size_t i = 0; i < snapshot.statics.size(); ++i)
+    w.now.objects[i].statics.restore(snapshot.statics[i]);
   for (Object& object : w.now.objects)
     if (object.matter->known && object.shown.displacement->empty()) // read meanwhile
       object.shown.displacement.replace().assign(3 * object.model().nodes.size(), 0);
-}
-
-} // namespace
-
-Saved save(World& w) {
-  for (const Object& object : w.now.objects)
-    object.statics->ahead = false;
-  for (const auto& body : w.now.bodies)
-    body->ahead = false;
-  w.saved = true;
-  return saved_now(w);
-}
-
-void take_back_again(World& w, Saved&& saved) noexcept {
-  put_back(w, std::move(saved));
-}
-
-/// Drops the caches of objects that have changed since the scene was saved. Caches depend on the
-/// shapes that were computed.
-void take_back(World& w, Saved&& saved) noexcept {
-  put_back(w, std::move(saved));
-  w.saved = false;
-  for (std::size_t i = 0; i < w.now.objects.size(); ++i) {
-    Object& object = w.now.objects[i];
-    const bool ahead = object.body != nullptr && object.body->ahead && moves_implicitly(object);
-    if (!ahead && !object.statics->ahead)
-      continue;
-    renew(object);
-    w.renewed.push_back(i);
-  }
 }
 
 } // namespace gewebe::simulation

@@ -48,7 +48,6 @@ std::vector<std::size_t> IslandParts::objects() const {
 // ---- bodies
 
 contact::ContactBody& BodyMember::begin(double from, double to, const Context& context) {
-  body_.ahead = true;
   return body_.moving->begin_contact_step(from, to, context);
 }
 
@@ -126,7 +125,6 @@ contact::ContactBody& StaticMember::begin(double /*from*/, double to, const Cont
     held_ = std::make_unique<contact::HeldBody>(x, x);
     return *held_;
   }
-  object.statics->ahead = true;
   if (way_)
     load_ = load_between(way_->from, way_->to, way_->stood,
                          (to - way_->start) / (way_->end - way_->start));
@@ -193,8 +191,8 @@ void StaticMember::end(std::span<const Force> forces, double /*h*/, const Contex
   object.shown.displacement.replace().assign(u.begin(), u.end());
   object.shown.whole = {};
   object.shown.box.reset();
-  if (object.statics->warped)
-    object.warped = object.statics->warped->answer();
+  if (object.statics.warped)
+    object.warped = object.statics.warped->answer();
 }
 
 // ---- instruments

@@ -76,7 +76,7 @@ struct Ways {
     const bool moves = object.method == Method::ffe && !object.in_motion &&
                        !is_held_altogether(object) &&
                        (!shown.valid || object.load->changes_until() > shown.time) &&
-                       (object.statics->made() || !object.load->empty());
+                       (object.statics.made() || !object.load->empty());
     if (!moves)
       return of_object(index).box;
     Load load = acting_at(object, to);
@@ -399,13 +399,13 @@ void advance_bodies(World& w, double to) {
                            to > w.now.clock.time;
   std::set<NodePair> late;
   for (;;) {
-    std::optional<Saved> saved;
+    std::optional<Snapshot> saved;
     if (may_be_late)
-      saved = saved_now(w);
+      saved = snapshot(w);
     const std::vector<NodePair> met = advance_once(w, to, late);
     if (met.empty())
       break;
-    take_back_again(w, std::move(*saved));
+    roll_back(w, std::move(*saved));
     late.insert(met.begin(), met.end());
   }
   SimulationCounts& counts = w.now.counts;
@@ -543,10 +543,8 @@ void Rule<SetContact>::apply(World& w, const SetContact& c) {
     Object& object = w.now.objects[index];
     object.meets = true;
     object.shown.valid = object.shown.valid && object.method == Method::ela;
-    if (object.body == nullptr)
-      continue;
-    object.body->ahead = true;
-    object.body->moving->wake();
+    if (object.body != nullptr)
+      object.body->moving->wake();
   }
 }
 

@@ -15,7 +15,7 @@ namespace {
 /// The elastostatic shape under what acts now; empty: nothing ever touched the object.
 std::span<const double> shape_now(World& w, Object& object) {
   std::span<const double> u;
-  if (object.statics->made() || (!object.load->empty() && !is_held_altogether(object))) {
+  if (object.statics.made() || (!object.load->empty() && !is_held_altogether(object))) {
     update_solver(w, object, acting_at(object, w.now.clock.time));
     u = static_shape(object);
     require_bounded(object, u);

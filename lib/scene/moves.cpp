@@ -43,7 +43,7 @@ Object renumbered(const Object& old, std::shared_ptr<const Model> model) {
   next.matter->counts.reset();
   if (is_solid(old))
     next.matter->shortest_edge = 0; // else it stays: a cut of a net makes none shorter
-  next.statics = std::make_shared<Statics>();
+  next.statics = {};
   next.warped = nullptr;
   next.strained = nullptr;
   next.load = gravity_of(*old.load);
@@ -467,10 +467,10 @@ void renew_bodies(World& w, const Motions& motions) {
 void move_all(World& w, std::size_t index, const Moves& moves, std::deque<Object> pieces,
               std::span<const Vec3> velocity) {
   const Object old = w.now.objects[index];
-  ElastostaticCounts& spent = pieces[0].statics->spent;
-  add_counts(spent, old.statics->spent);
-  if (old.statics->solver)
-    add_counts(spent, old.statics->solver->counts());
+  ElastostaticCounts& spent = pieces[0].statics.spent;
+  add_counts(spent, old.statics.spent);
+  if (old.statics.solver)
+    add_counts(spent, old.statics.solver->counts());
   move_shown(w.now.objects[index], moves, pieces);
   Motions motions = motions_of(w, index, moves, pieces, velocity);
   if (old.body != nullptr) {

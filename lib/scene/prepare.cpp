@@ -26,7 +26,6 @@ void Rule<Prepare>::apply(World& w, const Prepare& c) {
   need_model(object);
   if (is_held_altogether(object))
     return;
-  object.statics->ahead = true;
   if (has_law(object)) {
     strained_of(w, object).prepare(acting_at(object, w.now.clock.time));
   } else if (object.warp) {

@@ -23,8 +23,6 @@ struct Plain {
   static void require(World&, const Kind&) {}
   /// Whether `apply` may fail after the checks. It is then rolled back.
   static constexpr bool may_fail = false;
-  /// Whether the poses of instruments are recorded at the time of this change.
-  static constexpr bool is_moment = true;
   /// Prepares cuts that this change makes likely, so that the first cut costs no more than others.
   static void announce(World&, const Kind&) {}
   static constexpr bool announces_behind = true; // also after the change has taken effect
@@ -83,12 +81,6 @@ template <>
 struct Rule<Emit> : Plain<Emit> {
   static void apply(World& w, const Emit& c);
   static void log(const World& w, const Emit& c, ChangeRow& row);
-};
-template <>
-struct Rule<Renew> : Plain<Renew> {
-  static constexpr bool is_moment = false; // a recording has it at times without another change
-  static void apply(World& w, const Renew& c);
-  static void log(const World&, const Renew&, ChangeRow& row) { row.what = "renew"; }
 };
 
 // prepare.cpp

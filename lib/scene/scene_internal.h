@@ -1,7 +1,9 @@
 #pragma once
 // State of a scene as a value: everything that determines its future. A copy costs little, because
-// large parts are shared until one of the copies is written. A rollback is an assignment. Caches
-// (factors, columns, running sums) are not part of the value: see Statics and Body.
+// large parts are shared until one of the copies is written. A rollback is an assignment.
+//
+// Solvers (Statics, Body) are shared by copies, since factors are large. What their results depend
+// on beside the model, such as running sums, is part of a snapshot: see Snapshot.
 
 #include "base/copy_on_write.h"
 #include "contact/coupling.h"
@@ -80,20 +82,29 @@ struct Matter {
   Told told;
 };
 
-/// Caches of an elastostatic object. They depend on the shapes that were computed, so a rollback of
-/// one of these shapes drops the caches.
+/// Solvers of an elastostatic object, made when needed.
 struct Statics {
-  std::optional<Elastostatic> solver;
-  std::optional<TwoStep> two_step;            // over `solver`, made when needed
-  std::optional<WarpedStatics> warped;        // in place of both
-  std::optional<SolidStatic> strained;        // in place of all
-  std::shared_ptr<ComplianceSource> prepared; // of the cut model, by cut_source
-  std::unique_ptr<CutStiffness> stiffness;    // source of `prepared`
-  ElastostaticCounts spent;                   // by solvers that have been dropped
-  int slow = 0;                               // updates in a row that took too long for the rate
-  bool ahead = false;                         // it has changed since the scene was saved
+  std::shared_ptr<Elastostatic> solver;
+  std::shared_ptr<TwoStep> two_step;             // over `solver`
+  std::shared_ptr<WarpedStatics> warped;         // in place of both
+  std::shared_ptr<SolidStatic> strained;         // in place of all
+  std::shared_ptr<ComplianceSource> prepared;    // of the cut model, by cut_source
+  std::shared_ptr<const CutStiffness> stiffness; // source of `prepared`
+  ElastostaticCounts spent;                      // by solvers that have been dropped
+  int slow = 0;                                  // updates in a row that took too long for the rate
 
   bool made() const { return solver || warped || strained; }
+
+  /// What later results depend on, to the bit.
+  struct Past {
+    std::shared_ptr<const Elastostatic::Past> solver{};
+    std::shared_ptr<const TwoStep::Past> two_step{};
+    std::shared_ptr<const WarpedAnswer> warped{};
+    std::shared_ptr<const SolidRest> strained{};
+  };
+  Past past() const;
+  /// \pre these solvers were there at that time
+  void restore(const Past& past);
 };
 
 /// Body with one integrator: one elastodynamic object, or several that are attached to each other.
@@ -104,7 +115,6 @@ struct Body {
   double safe = 0; // largest stable step, s
   bool changed = true;
   std::map<std::size_t, Extent> rest_extents{}; // by part, while at rest: see Extents
-  bool ahead = false;                           // it has moved since the scene was saved
   bool warned_step = false;
   std::uint64_t taken = 0; // integration steps of the last advance
   contact::StepParts step_parts{};
@@ -190,7 +200,7 @@ struct CutState {
 /// State of an object. A cut replaces it by another one.
 struct Object {
   std::shared_ptr<Matter> matter = std::make_shared<Matter>();
-  std::shared_ptr<Statics> statics = std::make_shared<Statics>();
+  Statics statics{};
   Method method = Method::ela;
   Integration integration = Integration::semi_implicit; // of a net; automatic: not yet chosen
   CopyOnWrite<Load> load{};
@@ -292,6 +302,13 @@ struct Scene {
   SceneSettings settings;
   SimulationCounts counts;
   News news;
+};
+
+/// A scene with what its solvers depend on.
+struct Snapshot {
+  Scene scene;
+  std::vector<Body::Snapshot> bodies;
+  std::vector<Statics::Past> statics; // by object
 };
 
 } // namespace gewebe::simulation

@@ -53,7 +53,7 @@ void show_motion(Object& object) {
 void update_in_time(World& w, Object& object) {
   const std::size_t displaced = object.load->displacement.size();
   const bool watched = w.options.rate > 0 && w.options.warn && displaced > 0;
-  int& slow = object.statics->slow;
+  int& slow = object.statics.slow;
   if (!watched || slow == slow_enough) {
     update_solver(w, object, *object.shown.load);
     return;
@@ -166,20 +166,12 @@ void shape(World& w, Object& object) {
   warn_of_range(w, object);
 }
 
-void shape_to_show(World& w, Object& object) {
-  if (!object.shown.shaped)
-    object.statics->ahead = true;
-  shape(w, object);
-}
-
 void shape_in_step(World& w, Object& object) {
   Shown& shown = object.shown;
   if (shown.shaped && !shown.rough)
     return;
   if (shown.deferred)
-    return shape_to_show(w, object);
-  if (!shown.shaped)
-    object.statics->ahead = true;
+    return shape(w, object);
   const bool known = shown.shaped;
   shown.rough = false;
   find_shape(w, object, static_surface);
@@ -217,8 +209,6 @@ std::span<const double> whole_shape(World& w, Object& object) {
 
 std::span<const double> whole_shape_in_step(World& w, Object& object) {
   shape_in_step(w, object);
-  if (object.shown.displacement->size() != 3 * object.model().nodes.size())
-    object.statics->ahead = true;
   return whole_shape(w, object);
 }
 
@@ -268,7 +258,7 @@ void show_in_motion(World& w, Object& object) {
   object.shown.contact = object.touching;
   object.shown.shaped = true;
   warn_of_range(w, object);
-  if (object.statics->made())
+  if (object.statics.made())
     object.shown.forces = static_forces(object);
   end_showing(w, object);
 }
@@ -279,7 +269,7 @@ void show(World& w, Object& object) {
   begin_showing(w, object);
   Shown& shown = object.shown;
   const bool acted_on =
-      object.statics->made() || (!object.load->empty() && !is_held_altogether(object));
+      object.statics.made() || (!object.load->empty() && !is_held_altogether(object));
   if (object.method == Method::ffe) {
     shown.contact.clear();
     object.touching.clear();

@@ -263,10 +263,6 @@ void Simulation::want_shapes() noexcept {
   world_->options.shapes = true;
 }
 
-std::vector<std::size_t> Simulation::take_renewed() {
-  return std::exchange(world_->renewed, {});
-}
-
 const News& Simulation::news() const noexcept {
   return world_->now.news;
 }
@@ -281,7 +277,7 @@ void Simulation::warn_of_thresholds() {
     Stages& stages = object.stages;
     if (!stages.options || stages.warned)
       continue;
-    const auto& two_step = object.statics->two_step;
+    const auto& two_step = object.statics.two_step;
     const double largest = two_step ? two_step->largest() : 0;
     if (largest > stages.options->threshold)
       continue;
@@ -296,7 +292,7 @@ void Simulation::warn_of_thresholds() {
 SimulationCounts Simulation::counts() const {
   SimulationCounts all = world_->now.counts;
   for (const Object& object : world_->now.objects) {
-    const Statics& statics = *object.statics;
+    const Statics& statics = object.statics;
     add_counts(all.elastostatic, static_counts(object));
     if (!statics.two_step)
       continue;

@@ -31,8 +31,8 @@
 namespace gewebe {
 
 /// Functions that load an object's model and stiffness. Each is called when its result is first
-/// needed, `stiffness` again after a Renew. An exception that they throw leaves the call that
-/// needed the result.
+/// needed, `stiffness` again where a rollback has dropped a solver. An exception that they throw
+/// leaves the call that needed the result.
 struct ObjectSource {
   std::function<Model()> model;
   std::function<std::shared_ptr<ComplianceSource>(const Model&)>
@@ -249,9 +249,6 @@ public:
   /// Events since the last call of take_news.
   const News& news() const noexcept;
   void take_news() noexcept;
-  /// Objects whose caches were dropped, as by Renew, because a call threw under guard; since the
-  /// last call of take_renewed.
-  std::vector<std::size_t> take_renewed();
   /// To be called after the last step. Warns, once per object, if the threshold of the two-step
   /// method was never reached.
   void warn_of_thresholds();

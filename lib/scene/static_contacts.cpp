@@ -168,7 +168,7 @@ public:
       shown.contact = object.touching;
       shown.shaped = true;
       warn_of_range(w_, object);
-      if (object.statics->made())
+      if (object.statics.made())
         shown.forces = static_forces(object);
       at_object(w_, object, [&] { end_showing(w_, object); });
     }
@@ -317,13 +317,13 @@ std::vector<std::uint8_t> show_static_contacts(World& w) {
   std::vector<std::uint8_t> followed(w.now.instruments.size());
   std::set<ObjectPair> late;
   while (!w.now.contacts.empty() || !w.now.instruments.empty()) {
-    std::optional<Saved> saved;
+    std::optional<Snapshot> saved;
     if (!w.now.contacts.empty())
-      saved = saved_now(w);
+      saved = snapshot(w);
     const std::vector<ObjectPair> met = show_groups(w, late, shown, followed);
     if (met.empty())
       break;
-    take_back_again(w, std::move(*saved));
+    roll_back(w, std::move(*saved));
     late.insert(met.begin(), met.end());
   }
   for (std::size_t k = 0; k < w.now.instruments.size(); ++k) {

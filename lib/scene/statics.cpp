@@ -30,17 +30,17 @@ void add_counts(ElastostaticCounts& sum, const ElastostaticCounts& more) {
 }
 
 void make_solver(const World& w, Object& object, std::shared_ptr<ComplianceSource> source) {
-  object.statics->solver.emplace(object.model(), std::move(source), w.context,
-                                 ElastostaticOptions{.measure_error = w.options.measure_error,
-                                                     .tolerance = w.options.tolerance,
-                                                     .may_be_free = true});
+  object.statics.solver =
+      std::make_shared<Elastostatic>(object.model(), std::move(source), w.context,
+                                     ElastostaticOptions{.measure_error = w.options.measure_error,
+                                                         .tolerance = w.options.tolerance,
+                                                         .may_be_free = true});
 }
 
 namespace {
 
 std::shared_ptr<ComplianceSource> source_of(Object& object) {
-  Statics& statics = *object.statics;
-  statics.ahead = true;
+  Statics& statics = object.statics;
   if (statics.prepared)
     return std::exchange(statics.prepared, nullptr);
   if (!object.cut.first && object.matter->source.stiffness)
@@ -79,7 +79,7 @@ ElastostaticCounts counts_of(const Statics& statics) {
 
 Elastostatic& solver_of(World& w, Object& object) {
   need_model(object);
-  Statics& statics = *object.statics;
+  Statics& statics = object.statics;
   if (!statics.solver)
     make_solver(w, object, source_of(object));
   return *statics.solver;
@@ -87,9 +87,9 @@ Elastostatic& solver_of(World& w, Object& object) {
 
 WarpedStatics& warped_of(World& w, Object& object) {
   need_model(object);
-  Statics& statics = *object.statics;
+  Statics& statics = object.statics;
   if (!statics.warped) {
-    statics.warped.emplace(object.model(), source_of(object), w.context);
+    statics.warped = std::make_shared<WarpedStatics>(object.model(), source_of(object), w.context);
     statics.warped->restore(object.warped);
   }
   return *statics.warped;
@@ -117,7 +117,7 @@ std::shared_ptr<const SolidRest> shown_rest(const Object& object) {
 
 SolidStatic& strained_of(World& w, Object& object) {
   need_model(object);
-  std::optional<SolidStatic>& strained = object.statics->strained;
+  std::shared_ptr<SolidStatic>& strained = object.statics.strained;
   if (strained)
     return *strained;
   if (!is_solid(object))
@@ -126,8 +126,7 @@ SolidStatic& strained_of(World& w, Object& object) {
   if (!object.model().springs.empty() || body_count(object.model()) != object.model().nodes.size())
     throw Error("object " + object.name() +
                 " has springs beside its tetrahedra, expected tetrahedra alone for law= at rest");
-  object.statics->ahead = true;
-  strained.emplace(object.model(), *law_of(object), w.context);
+  strained = std::make_shared<SolidStatic>(object.model(), *law_of(object), w.context);
   if (!object.strained)
     object.strained = shown_rest(object);
   strained->restore(object.strained);
@@ -135,7 +134,7 @@ SolidStatic& strained_of(World& w, Object& object) {
 }
 
 ElastostaticCounts static_counts(const Object& object) {
-  const Statics& statics = *object.statics;
+  const Statics& statics = object.statics;
   ElastostaticCounts all = statics.spent;
   add_counts(all, counts_of(statics));
   return all;
@@ -144,12 +143,11 @@ ElastostaticCounts static_counts(const Object& object) {
 void update_solver(World& w, Object& object, const Load& load) {
   if (object.shown.rough)
     shape_in_step(w, object); // while the solver is at that load
-  object.statics->ahead = true;
   update_stages(w, object, load);
 }
 
-void renew(Object& object) {
-  Statics& statics = *object.statics;
+void drop_solvers(Object& object) {
+  Statics& statics = object.statics;
   add_counts(statics.spent, counts_of(statics));
   statics.solver.reset();
   statics.warped.reset();
@@ -162,17 +160,15 @@ void renew(Object& object) {
   }
   statics.stiffness.reset();
   statics.prepared.reset();
-  if (object.body != nullptr && moves_implicitly(object))
-    object.body->moving->renew();
   object.shown.valid = false;
 }
 
 /// \pre it has stages
 TwoStep& two_step_of(World& w, Object& object) {
-  std::optional<TwoStep>& two_step = object.statics->two_step;
+  std::shared_ptr<TwoStep>& two_step = object.statics.two_step;
   if (!two_step)
-    two_step.emplace(object.model(), object.stages.second(), w.context, *object.stages.options,
-                     w.options.tolerance);
+    two_step = std::make_shared<TwoStep>(object.model(), object.stages.second(), w.context,
+                                         *object.stages.options, w.options.tolerance);
   return *two_step;
 }
 
@@ -198,7 +194,7 @@ void update_stages(World& w, Object& object, const Load& load) {
 }
 
 std::span<const double> static_shape(Object& object) {
-  Statics& statics = *object.statics;
+  Statics& statics = object.statics;
   if (statics.strained)
     return statics.strained->displacement();
   if (statics.warped)
@@ -208,7 +204,7 @@ std::span<const double> static_shape(Object& object) {
 }
 
 std::span<const double> static_surface(Object& object) {
-  Statics& statics = *object.statics;
+  Statics& statics = object.statics;
   if (statics.strained)
     return statics.strained->displacement();
   if (statics.warped)
@@ -218,7 +214,7 @@ std::span<const double> static_surface(Object& object) {
 }
 
 std::span<const double> static_rough_surface(Object& object) {
-  Statics& statics = *object.statics;
+  Statics& statics = object.statics;
   if (statics.strained)
     return statics.strained->displacement();
   if (statics.warped)
@@ -228,7 +224,7 @@ std::span<const double> static_rough_surface(Object& object) {
 }
 
 void verify_shape(Object& object) {
-  Statics& statics = *object.statics;
+  Statics& statics = object.statics;
   if (statics.two_step)
     statics.two_step->verify(*statics.solver);
   else if (statics.solver)
@@ -236,7 +232,7 @@ void verify_shape(Object& object) {
 }
 
 std::vector<NodeVector> static_forces(const Object& object) {
-  const Statics& statics = *object.statics;
+  const Statics& statics = object.statics;
   if (statics.strained)
     return statics.strained->holding_forces();
   if (statics.warped)
@@ -280,9 +276,8 @@ void Rule<SetWarp>::apply(World& w, const SetWarp& c) {
   Object& object = w.now.objects.at(c.object);
   if (object.warp)
     return;
-  if (object.statics->made())
-    renew(object);
-  object.statics->ahead = true;
+  if (object.statics.made())
+    drop_solvers(object);
   object.warp = true;
   touch(object);
 }
@@ -307,16 +302,12 @@ void Rule<SetTwoStep>::check(World& w, const SetTwoStep& c) {
 
 void Rule<SetTwoStep>::apply(World& w, const SetTwoStep& c) {
   Object& object = w.now.objects.at(c.object);
-  if (object.statics->two_step) {
-    object.statics->ahead = true;
-    object.statics->two_step->set(c.options);
-  }
+  if (object.statics.two_step)
+    object.statics.two_step->set(c.options);
   object.stages.options = c.options;
   if (c.model && !object.cut.first && c.model != object.stages.first_model) {
-    if (object.statics->two_step) {
-      renew(object);
-      object.statics->ahead = true;
-    }
+    if (object.statics.two_step)
+      drop_solvers(object);
     object.stages.first_model = c.model;
     set_second(w, object, c.model);
   } else if (!object.stages.second) {

@@ -46,17 +46,16 @@ enum class Feature : std::uint8_t {
   attach,
   method, ///< change of the method
   two_step,
-  renew,
   warp,         ///< large rotations
   prepare,      ///< advance computation for contacts and cuts
   contact,      ///< with another object's surface
   self_contact, ///< of its surface with itself
 };
 inline constexpr std::array all_features{
-    Feature::force,   Feature::pressure,    Feature::displace, Feature::grasp,   Feature::touch,
-    Feature::cut,     Feature::blade,       Feature::tear,     Feature::restore, Feature::attach,
-    Feature::method,  Feature::two_step,    Feature::renew,    Feature::warp,    Feature::prepare,
-    Feature::contact, Feature::self_contact};
+    Feature::force,   Feature::pressure, Feature::displace, Feature::grasp,
+    Feature::touch,   Feature::cut,      Feature::blade,    Feature::tear,
+    Feature::restore, Feature::attach,   Feature::method,   Feature::two_step,
+    Feature::warp,    Feature::prepare,  Feature::contact,  Feature::self_contact};
 
 /// An unsupported pair of trait and feature.
 struct Gap {

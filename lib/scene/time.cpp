@@ -71,7 +71,7 @@ bool needs_showing(const Object& object) {
 /// Now, so that a failure is one of this step.
 void find_shapes(World& w, Object& object) {
   if (w.now.settings.emits.any_shapes() || w.options.shapes)
-    shape_to_show(w, object);
+    shape(w, object);
   if (w.now.settings.emits.shapes || w.options.shapes)
     (void)whole_shape(w, object);
 }

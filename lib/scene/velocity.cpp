@@ -46,7 +46,6 @@ std::vector<Vec3> shape_velocity(World& w, Object& object, bool afresh) {
     return object.came.velocity;
   if (!has_moved(w, object))
     return {};
-  object.statics->ahead = true;
   Load load = *object.came.load, now = *object.shown.load;
   // Nodes that instruments push are where they are.
   for (const auto& [node, u] : object.came.touched)

@@ -33,21 +33,14 @@ struct World {
   SimulationOptions options;
   Scene now{};
   bool saved = false;                                  // under guard: an outer call rolls back
-  std::vector<std::size_t> renewed{};                  // see Simulation::take_renewed
   std::vector<std::shared_ptr<IslandCache>> islands{}; // surfaces of islands, see islands.cpp
 };
 
 // guard.cpp: rollback of the scene after a call that fails
-struct Saved {
-  Scene scene;
-  std::vector<Body::Snapshot> bodies;
-};
-Saved save(World& w);
-/// Rolls back after a failure, and drops the caches that depend on the failed call.
-void take_back(World& w, Saved&& saved) noexcept;
-/// Rolls back so that the same step can be repeated. Caches stay valid, even within guarded().
-Saved saved_now(const World& w);
-void take_back_again(World& w, Saved&& saved) noexcept;
+Snapshot snapshot(const World& w);
+/// Rolls back: all later results are, to the bit, those that followed the snapshot. May be called
+/// within guarded().
+void roll_back(World& w, Snapshot&& snapshot) noexcept;
 
 /// Does all of the work or, if it throws under guard, nothing.
 template <class Work>
@@ -56,11 +49,13 @@ void guarded(World& w, Work&& work) {
     work();
     return;
   }
-  Saved before = save(w);
+  Snapshot before = snapshot(w);
+  w.saved = true;
   try {
     work();
   } catch (...) {
-    take_back(w, std::move(before));
+    roll_back(w, std::move(before));
+    w.saved = false;
     throw;
   }
   w.saved = false;
@@ -128,8 +123,8 @@ SolidStatic& strained_of(World& w, Object& object);
 ElastostaticCounts static_counts(const Object& object);
 void make_solver(const World& w, Object& object, std::shared_ptr<ComplianceSource> source);
 void update_solver(World& w, Object& object, const Load& load);
-/// Drops the caches of an object: factors, columns, running sums.
-void renew(Object& object);
+/// Drops the solvers of an object: factors, columns, running sums.
+void drop_solvers(Object& object);
 /// Adds counts; errors become the larger of both.
 void add_counts(ElastostaticCounts& sum, const ElastostaticCounts& more);
 void add_counts(SolidStepCounts& sum, const SolidStepCounts& more);
@@ -226,8 +221,6 @@ void load_shown(const World& w, Object& object);
 void warn_of_range(World& w, Object& object);
 /// Computes the displacement for output, within the tolerance.
 void shape(World& w, Object& object);
-/// The same during a step. A rollback of the step discards the result.
-void shape_to_show(World& w, Object& object);
 /// Computes the exact displacement, on which the scene depends.
 void shape_in_step(World& w, Object& object);
 /// Displacement of all nodes, inner ones of a solid included.

@@ -1,5 +1,6 @@
 #include "statics/elastostatic.h"
 
+#include "base/copy_on_write.h"
 #include "base/error.h"
 #include "base/unique_number.h"
 #include "compliance/compliance.h"
@@ -20,6 +21,28 @@
 
 namespace gewebe {
 
+struct Elastostatic::Past {
+  /// The last load, its reactions, and its shape once it was read.
+  struct Last {
+    bool by_block = false; // how the load is met
+    std::uint64_t id = 0;  // of the compliance with these nodes held
+    CopyOnWrite<std::vector<std::uint32_t>> id_of{};
+    CopyOnWrite<Load> load{};
+    CopyOnWrite<std::vector<NodeVector>> forces{};
+    CopyOnWrite<std::vector<double>> u{};     // of the rows that sums have
+    CopyOnWrite<std::vector<double>> whole{}; // over all axes, where these are more
+    CopyOnWrite<std::vector<double>> rough{}; // as u, within the tolerance
+    bool shape_known = true, whole_known = false, rough_known = false;
+    bool measured = true; // a shape under this load
+  };
+
+  Compliance::Past compliance;
+  LoadAnswer::Past answer;
+  ForcesAt::Past block;
+  HeldContacts::Past held;
+  Last last;
+};
+
 struct Elastostatic::State {
   const Model& model;
   Context context;
@@ -31,24 +54,14 @@ struct Elastostatic::State {
   LoadAnswer answer; // beside displacements
   ForcesAt block;
   HeldContacts held;
-  bool by_block = false; // how the present load is met
-  std::uint64_t id = 0;  // of the compliance with these nodes held
-  std::vector<std::uint32_t> id_of;
-
-  // The last load, its reactions, and its shape once it was read.
-  Load load;
-  std::vector<NodeVector> forces;
-  std::vector<double> u;     // of the rows that sums have
-  std::vector<double> whole; // over all axes, where these are more
-  std::vector<double> rough; // as u, within the tolerance
-  bool shape_known = true, whole_known = false, rough_known = false;
-  bool measured = true; // a shape under this load
+  Past::Last last;
 
   State(const Model& m, std::shared_ptr<ComplianceSource> s, const Context& c,
         const ElastostaticOptions& o)
       : model(m), context(without_progress(c)), options(o),
         compliance(m, std::move(s), c, o.tolerance > 0, o.may_be_free), answer(m, compliance),
-        block(m, compliance, answer), held(m, context, compliance.is_free()), u(compliance.rows()) {
+        block(m, compliance, answer), held(m, context, compliance.is_free()) {
+    last.u.write().resize(compliance.rows());
     if (compliance.is_free())
       stand_still({});
   }
@@ -63,40 +76,41 @@ struct Elastostatic::State {
   /// Less than the largest size of an entry of the shape.
   double min_size() {
     double size = 0;
-    for (const auto& entry : load.displacement)
+    for (const auto& entry : last.load->displacement)
       for (int a = 0; a < 3; ++a)
         size = std::max(size, std::abs(entry.second[a]));
-    if (size > 0 || load.force.empty())
+    if (size > 0 || last.load->force.empty())
       return size;
-    if (!compliance.columns_pay(nodes_of(load.force)))
+    if (!compliance.columns_pay(nodes_of(last.load->force)))
       return 0;
     std::vector<std::size_t> where;
-    for (const auto& entry : load.force)
+    for (const auto& entry : last.load->force)
       for (int a = 0; a < 3; ++a)
         where.push_back(axis_of(entry.first, a));
-    const double max = largest_size(answer.at(load, where));
+    const double max = largest_size(answer.at(*last.load, where));
     return std::isfinite(max) ? max : 0;
   }
 
   /// \return whether nothing was left out
   bool make_shape(double tolerance, std::vector<double>& shape) {
-    if (load.displacement.empty()) {
+    if (last.load->displacement.empty()) {
       // Where sums may leave something out, they are made for this load alone.
-      if (tolerance > 0 && !answer.known(load) && compliance.columns_pay(nodes_of(load.force))) {
+      if (tolerance > 0 && !answer.known(*last.load) &&
+          compliance.columns_pay(nodes_of(last.load->force))) {
         add_outer(tolerance, shape);
-        answer.note(load);
+        answer.note(*last.load);
         return false;
       }
-      shape = answer.whole(load);
+      shape = answer.whole(*last.load);
       return true;
     }
     bool exact = true;
-    if (!block.shape(load, shape)) {
-      const std::vector<std::uint32_t> nodes = nodes_of(load.displacement);
-      const bool columns = !by_block || compliance.columns_for_shape(nodes, block.shapes());
-      if (columns && (answer.known(load) || compliance.columns_pay(nodes))) {
-        shape = answer.whole(load);
-        compliance.add(forces, tolerance * min_size(), shape);
+    if (!block.shape(*last.load, shape)) {
+      const std::vector<std::uint32_t> nodes = nodes_of(last.load->displacement);
+      const bool columns = !last.by_block || compliance.columns_for_shape(nodes, block.shapes());
+      if (columns && (answer.known(*last.load) || compliance.columns_pay(nodes))) {
+        shape = answer.whole(*last.load);
+        compliance.add(*last.forces, tolerance * min_size(), shape);
         exact = tolerance == 0;
       } else {
         solve_all(shape);
@@ -109,9 +123,9 @@ struct Elastostatic::State {
   /// Under weight and given forces.
   void add_outer(double tolerance, std::vector<double>& shape) {
     const double allowed = tolerance > 0 ? tolerance * min_size() : 0;
-    shape = answer.weight(load.gravity);
+    shape = answer.weight(last.load->gravity);
     shape.resize(compliance.rows(), 0);
-    compliance.add(as_vectors(load.force), allowed, shape);
+    compliance.add(as_vectors(last.load->force), allowed, shape);
   }
 
   void solve_all(std::vector<double>& shape) {
@@ -122,7 +136,7 @@ struct Elastostatic::State {
 
   /// Displaced nodes stand where they must.
   void place_displaced(std::vector<double>& shape) const {
-    for (const auto& [node, d] : load.displacement)
+    for (const auto& [node, d] : last.load->displacement)
       for (int a = 0; a < 3; ++a)
         if (const std::size_t axis = axis_of(node, a); axis < shape.size())
           shape[axis] = d[a];
@@ -130,8 +144,8 @@ struct Elastostatic::State {
 
   /// The load with what holds its displaced nodes.
   std::vector<double> all_forces() const {
-    std::vector<double> f = forces_over_axes(model, load);
-    for (const NodeVector& contact : forces)
+    std::vector<double> f = forces_over_axes(model, *last.load);
+    for (const NodeVector& contact : *last.forces)
       for (int a = 0; a < 3; ++a)
         f[axis_of(contact.node, a)] += contact.value[a];
     return f;
@@ -154,36 +168,37 @@ struct Elastostatic::State {
   const std::vector<double>& need_whole() {
     if (all_rows()) {
       need_shape();
-      return u;
+      return *last.u;
     }
-    if (!whole_known) {
+    if (!last.whole_known) {
+      std::vector<double>& whole = last.whole.replace();
       whole = all_forces();
       compliance.solve(whole);
       place_displaced(whole);
       require_finite(whole);
-      whole_known = true;
+      last.whole_known = true;
     }
-    return whole;
+    return *last.whole;
   }
 
   void need_shape() {
-    if (!shape_known)
-      (void)make_new(0, u);
-    shape_known = true;
+    if (!last.shape_known)
+      (void)make_new(0, last.u.replace());
+    last.shape_known = true;
   }
 
   const std::vector<double>& need_rough() {
-    if (options.tolerance > 0 && !shape_known && !rough_known) {
-      rough_known = true;
-      if (make_new(options.tolerance, rough)) {
-        u.swap(rough);
-        shape_known = true;
+    if (options.tolerance > 0 && !last.shape_known && !last.rough_known) {
+      last.rough_known = true;
+      if (make_new(options.tolerance, last.rough.replace())) {
+        std::swap(last.u, last.rough);
+        last.shape_known = true;
       }
     }
-    if (rough_known && !shape_known)
-      return rough;
+    if (last.rough_known && !last.shape_known)
+      return *last.rough;
     need_shape();
-    return u;
+    return *last.u;
   }
 
   bool make_new(double tolerance, std::vector<double>& shape) {
@@ -207,11 +222,11 @@ struct Elastostatic::State {
   /// The shape in another place: nothing that other answers come from changes.
   std::vector<double> make_aside(double tolerance) {
     std::vector<double> shape;
-    if (compliance.at_hand(nodes_of(load.force)) &&
-        compliance.at_hand(nodes_of(load.displacement))) {
-      add_outer(load.displacement.empty() ? tolerance : 0, shape);
-      if (!load.displacement.empty())
-        compliance.add(forces, tolerance > 0 ? tolerance * min_size() : 0, shape);
+    if (compliance.at_hand(nodes_of(last.load->force)) &&
+        compliance.at_hand(nodes_of(last.load->displacement))) {
+      add_outer(last.load->displacement.empty() ? tolerance : 0, shape);
+      if (!last.load->displacement.empty())
+        compliance.add(*last.forces, tolerance > 0 ? tolerance * min_size() : 0, shape);
     } else {
       solve_all(shape);
     }
@@ -222,26 +237,28 @@ struct Elastostatic::State {
 
   /// A shape that can't be made is one that is wrong.
   void verify() {
-    if (measured || !options.measure_error)
+    if (last.measured || !options.measure_error)
       return;
     try {
-      measure(shape_known ? u : rough_known ? rough : make_aside(options.tolerance));
+      measure(last.shape_known   ? *last.u
+              : last.rough_known ? *last.rough
+                                 : make_aside(options.tolerance));
     } catch (const Cancelled&) {
       throw;
     } catch (const Error&) {
-      measured = true;
+      last.measured = true;
       counts.worst_shape.error = counts.backward_error = std::numeric_limits<double>::quiet_NaN();
     }
   }
 
   void measure(const std::vector<double>& shape) {
-    measured = true;
+    last.measured = true;
     if (options.tolerance > 0 && !compliance.is_free())
       counts.shape_error = std::max(counts.shape_error, distance(shape, make_aside(0)));
     ShapeError error;
     if (!all_rows())
       error.error = distance(shape, need_whole());
-    const std::vector<double>& over_axes = all_rows() ? shape : whole;
+    const std::vector<double>& over_axes = all_rows() ? shape : *last.whole;
     if (!norm) {
       norm = stiffness_norm(stiffness_matrix(model));
       stiffness.emplace(model);
@@ -260,8 +277,8 @@ struct Elastostatic::State {
     if (scale > 0)
       error.error = std::max(error.error, residual / scale);
     if (size > 0) {
-      const EntryBound given = compliance.bound(as_vectors(load.force)),
-                       found = compliance.bound(forces);
+      const EntryBound given = compliance.bound(as_vectors(last.load->force)),
+                       found = compliance.bound(*last.forces);
       error.limit += (given.entry + found.entry) / size;
       error.relative = given.relative;
     }
@@ -272,33 +289,32 @@ struct Elastostatic::State {
 
   void update(const Load& now) {
     ++counts.updates;
-    if (now == load) {
+    if (now == *last.load) {
       ++counts.unchanged;
       return;
     }
-    shape_known = whole_known = rough_known = measured = false;
-    std::vector<NodeVector> before = std::move(forces);
-    forces.clear();
+    last.shape_known = last.whole_known = last.rough_known = last.measured = false;
+    const auto before = std::exchange(last.forces, {});
     try {
       if (!now.displacement.empty())
         meet(now);
       else if (compliance.is_free())
         stand_still(now);
       double sum = 0;
-      for (const NodeVector& f : forces)
+      for (const NodeVector& f : *last.forces)
         sum += std::abs(f.value.x) + std::abs(f.value.y) + std::abs(f.value.z);
       if (!std::isfinite(sum))
         throw Error("the contact forces are not finite, expected a smaller load");
     } catch (...) {
-      forces = std::move(before);
-      shape_known = whole_known = rough_known = measured = false;
+      last.forces = before;
+      last.shape_known = last.whole_known = last.rough_known = last.measured = false;
       throw;
     }
-    load = now;
-    if (shape_known) {
+    last.load.replace() = now;
+    if (last.shape_known) {
       ++counts.shapes;
       if (options.measure_error)
-        measure(u);
+        measure(*last.u);
     }
   }
 
@@ -306,37 +322,37 @@ struct Elastostatic::State {
   void stand_still(const Load& now) {
     if (!now.empty())
       compliance.require_held();
-    u.assign(compliance.rows(), 0);
-    whole.assign(all_rows() ? 0 : compliance.axes(), 0);
-    shape_known = whole_known = true;
+    last.u.replace().assign(compliance.rows(), 0);
+    last.whole.replace().assign(all_rows() ? 0 : compliance.axes(), 0);
+    last.shape_known = last.whole_known = true;
   }
 
   void meet(const Load& now) {
     if (!compliance.is_free() && block.cheaper(now, options.block_limit) && block.meet(now)) {
-      forces = block.forces();
-      by_block = true;
+      last.forces = block.forces();
+      last.by_block = true;
       return;
     }
-    std::vector<double>& shape = all_rows() ? u : whole;
-    forces = held.meet(now, shape);
-    by_block = false;
+    std::vector<double>& shape = (all_rows() ? last.u : last.whole).replace();
+    last.forces = held.meet(now, shape);
+    last.by_block = false;
     if (!all_rows()) {
-      u = whole;
-      u.resize(compliance.rows());
-      whole_known = true;
+      std::vector<double>& u = last.u.replace();
+      u.assign(shape.begin(), shape.begin() + static_cast<std::ptrdiff_t>(compliance.rows()));
+      last.whole_known = true;
     }
-    shape_known = true;
+    last.shape_known = true;
   }
 
   // ---- contact
 
   std::uint64_t compliance_id(const Load& now) {
     std::vector<std::uint32_t> nodes = nodes_of(now.displacement);
-    if (id == 0 || nodes != id_of) {
-      id = unique_number();
-      id_of = std::move(nodes);
+    if (last.id == 0 || nodes != *last.id_of) {
+      last.id = unique_number();
+      last.id_of = std::move(nodes);
     }
-    return id;
+    return last.id;
   }
 
   /// Columns of these nodes and of displaced ones.
@@ -356,14 +372,14 @@ struct Elastostatic::State {
       update(now);
     else
       compliance.require_held();
-    if (now.displacement.empty() || by_block)
+    if (now.displacement.empty() || last.by_block)
       need_columns(now, std::span(&node, 1));
     const auto put = [](const ComplianceBlock& from, std::array<double, 9>& to) {
       for (std::size_t i = 0; i < 3; ++i)
         for (std::size_t j = 0; j < 3; ++j)
           to[3 * i + j] = from[j][i];
     };
-    if (!now.displacement.empty() && !by_block) {
+    if (!now.displacement.empty() && !last.by_block) {
       const ColumnCache& columns = held.columns(std::span(&node, 1));
       for (std::size_t k = 0; k < rows.size(); ++k)
         for (std::size_t i = 0; i < 3; ++i)
@@ -396,7 +412,7 @@ struct Elastostatic::State {
 
   DelassusOperator delassus_operator(const Load& now, std::span<const std::uint32_t> nodes) {
     update(now);
-    const bool held_by_factor = !now.displacement.empty() && !by_block;
+    const bool held_by_factor = !now.displacement.empty() && !last.by_block;
     if (!held_by_factor)
       compliance.require_held();
     if (!held_by_factor)
@@ -439,6 +455,21 @@ Elastostatic::Elastostatic(const Model& model, std::shared_ptr<ComplianceSource>
 Elastostatic::~Elastostatic() = default;
 Elastostatic::Elastostatic(Elastostatic&&) noexcept = default;
 
+std::shared_ptr<const Elastostatic::Past> Elastostatic::past() const {
+  const State& s = *state_;
+  return std::make_shared<const Past>(
+      Past{s.compliance.past(), s.answer.past(), s.block.past(), s.held.past(), s.last});
+}
+
+void Elastostatic::restore(const Past& past) {
+  State& s = *state_;
+  s.compliance.restore(past.compliance);
+  s.answer.restore(past.answer);
+  s.block.restore(past.block);
+  s.held.restore(past.held);
+  s.last = past.last;
+}
+
 void Elastostatic::update(const Load& load) {
   state_->update(load);
 }
@@ -449,7 +480,7 @@ std::span<const double> Elastostatic::displacement() {
 
 std::span<const double> Elastostatic::surface_displacement() {
   state_->need_shape();
-  return state_->u;
+  return *state_->last.u;
 }
 
 std::span<const double> Elastostatic::rough_surface() {
@@ -461,7 +492,7 @@ void Elastostatic::verify() {
 }
 
 const std::vector<NodeVector>& Elastostatic::contact_forces() const noexcept {
-  return state_->forces;
+  return *state_->last.forces;
 }
 
 void Elastostatic::compliance_blocks(const Load& load, std::uint32_t node,

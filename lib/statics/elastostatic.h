@@ -99,6 +99,13 @@ public:
   ~Elastostatic();
   Elastostatic(Elastostatic&&) noexcept;
 
+  /// What later results depend on, to the bit: running sums, factors that nodes have joined, which
+  /// columns are in memory, the last result. Copies share it.
+  struct Past;
+  std::shared_ptr<const Past> past() const;
+  /// Goes back. \pre a past of this object
+  void restore(const Past& past);
+
   /// Computes the forces under `load`. Only changed parts are computed again; for the last load
   /// nothing is done. After an exception the previous load remains.
   /// \pre nodes exist, no displacement along an axis that the model holds

@@ -21,15 +21,12 @@ bool same_nodes(const Map& a, const Map& b) {
 } // namespace
 
 void HeldContacts::refactor(const Load& now) {
-  if (!nodes_.empty() && same_nodes(now.displacement, nodes_))
+  if (now_.held && same_nodes(now.displacement, now_.held->nodes))
     return;
   if (!stiffness_)
     stiffness_.emplace(model_, context_);
-  held_.reset();
-  nodes_.clear();
-  columns_.reset();
-  base_.clear();
-  modes_.clear();
+  now_ = {};
+  auto made = std::make_shared<Held>();
   std::vector<std::uint8_t> fixed(axes_, 0);
   for (const auto& entry : now.displacement)
     std::fill_n(fixed.begin() + static_cast<std::ptrdiff_t>(axis_of(entry.first, 0)), 3, 1);
@@ -43,20 +40,21 @@ void HeldContacts::refactor(const Load& now) {
       Model held = model_;
       for (const auto& entry : now.displacement)
         held.nodes[entry.first].fixed = fixed_all;
-      held_.emplace(factorise_axes(held, context_));
+      made->solver.emplace(factorise_axes(held, context_));
     } else {
-      held_.emplace(factorise_axes(model_, fixed, context_));
+      made->solver.emplace(factorise_axes(model_, fixed, context_));
     }
   }
-  nodes_ = now.displacement;
+  made->nodes = now.displacement;
+  now_.held = std::move(made);
 }
 
-void HeldContacts::solve(std::span<double> over_axes, std::size_t columns) {
-  if (!held_) {
+void HeldContacts::solve(const Held& held, std::span<double> over_axes, std::size_t columns) {
+  if (!held.solver) {
     std::fill(over_axes.begin(), over_axes.end(), 0.0);
     return;
   }
-  held_->solve(over_axes, columns);
+  held.solver->solve(over_axes, columns);
   solves_ += columns;
 }
 
@@ -68,13 +66,14 @@ void HeldContacts::shape_under(std::span<const double> f, std::span<const double
   shape.resize(axes_);
   for (std::size_t r = 0; r < axes_; ++r)
     shape[r] = (f.empty() ? 0 : f[r]) - product[r];
-  solve(shape, 1);
+  solve(*now_.held, shape, 1);
   for (std::size_t r = 0; r < axes_; ++r)
     shape[r] += prescribed[r]; // on held axes the solution is 0
 }
 
 std::vector<NodeVector> HeldContacts::meet(const Load& now, std::vector<double>& u) {
   refactor(now);
+  Held& held = *now_.held;
   const std::vector<double> f = forces_over_axes(model_, now);
   std::vector<double> wanted(3 * now.displacement.size()), prescribed(axes_, 0);
   std::size_t k = 0;
@@ -89,15 +88,15 @@ std::vector<NodeVector> HeldContacts::meet(const Load& now, std::vector<double>&
   };
   std::vector<double> coefficients, rest;
   std::vector<double> shape;
-  const bool rigid = held_ && modes_.express(wanted, coefficients, rest);
-  if (!held_) { // no axis is free
+  const bool rigid = held.solver && now_.modes->express(wanted, coefficients, rest);
+  if (!held.solver) { // no axis is free
     spread(wanted, 1);
     shape = std::move(prescribed);
-  } else if (rigid || modes_.open()) {
-    if (base_.empty() || base_gravity_ != now.gravity || base_force_ != now.force) {
-      shape_under(f, prescribed, base_);
-      base_gravity_ = now.gravity;
-      base_force_ = now.force;
+  } else if (rigid || now_.modes->open()) {
+    if (held.base.empty() || held.base_gravity != now.gravity || held.base_force != now.force) {
+      shape_under(f, prescribed, held.base);
+      held.base_gravity = now.gravity;
+      held.base_force = now.force;
     }
     if (!rigid) {
       const double length = [&] {
@@ -111,13 +110,14 @@ std::vector<NodeVector> HeldContacts::meet(const Load& now, std::vector<double>&
       shape_under({}, prescribed, answer);
       for (double& r : rest)
         r /= length;
-      modes_.add(rest, std::move(answer));
+      now_.modes.write().add(rest, std::move(answer));
       coefficients.push_back(length);
     }
-    shape = base_;
-    modes_.answer(coefficients, shape);
+    shape = held.base;
+    now_.modes->answer(coefficients, shape);
   } else {
-    modes_.give_up();
+    if (now_.modes->size() > 0)
+      now_.modes.write().give_up();
     spread(wanted, 1);
     shape_under(f, prescribed, shape);
   }
@@ -139,19 +139,20 @@ std::vector<NodeVector> HeldContacts::meet(const Load& now, std::vector<double>&
 }
 
 const ColumnCache& HeldContacts::columns(std::span<const std::uint32_t> nodes) {
-  if (!columns_)
-    columns_.emplace(
+  Held& held = *now_.held;
+  if (!held.columns)
+    held.columns.emplace(
         model_.nodes.size(), nullptr,
-        [this](std::span<const std::uint32_t> some, std::span<double> columns) {
+        [this, &held](std::span<const std::uint32_t> some, std::span<double> columns) {
           std::fill(columns.begin(), columns.end(), 0.0);
           for (std::size_t k = 0; k < some.size(); ++k)
             for (int a = 0; a < 3; ++a)
               columns[(3 * k + static_cast<std::size_t>(a)) * axes_ + axis_of(some[k], a)] = 1;
-          solve(columns, 3 * some.size());
+          solve(held, columns, 3 * some.size());
         },
         static_cast<double>(context_.max_memory) / 4, false);
-  columns_->need(nodes);
-  return *columns_;
+  held.columns->need(nodes);
+  return *held.columns;
 }
 
 } // namespace gewebe

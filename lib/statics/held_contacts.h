@@ -3,6 +3,7 @@
 // u_f + K_cc d.
 
 #include "base/context.h"
+#include "base/copy_on_write.h"
 #include "columns/column_cache.h"
 #include "compliance/axis_solver.h"
 #include "compliance/shape_modes.h"
@@ -13,6 +14,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <map>
+#include <memory>
 #include <optional>
 #include <span>
 #include <vector>
@@ -21,7 +23,18 @@ namespace gewebe {
 
 /// Shapes and reactions under prescribed displacements. It caches the factor for the last nodes.
 class HeldContacts {
+  struct Held;
+
 public:
+  /// Shapes of rigid motions, whose bits depend on the displacements before, and the factor for
+  /// their nodes. Copies share them.
+  struct Past {
+    std::shared_ptr<Held> held{};
+    CopyOnWrite<ShapeModes> modes{}; ///< displacements to shape
+  };
+  const Past& past() const noexcept { return now_; }
+  void restore(const Past& past) { now_ = past; }
+
   /// Keeps a reference to the model.
   /// \param free  whether K is singular; displacements may then fail to hold the model
   HeldContacts(const Model& model, const Context& context, bool free)
@@ -41,7 +54,7 @@ public:
 
 private:
   void refactor(const Load& now);
-  void solve(std::span<double> over_axes, std::size_t columns);
+  void solve(const Held& held, std::span<double> over_axes, std::size_t columns);
   void shape_under(std::span<const double> f, std::span<const double> prescribed,
                    std::vector<double>& shape);
 
@@ -50,13 +63,16 @@ private:
   bool free_;
   std::size_t axes_; ///< 3 n
   std::optional<StiffnessOperator> stiffness_;
-  std::map<std::uint32_t, Vec3> nodes_;
-  std::optional<AxisSolver> held_; ///< empty if no axis is free
-  std::optional<ColumnCache> columns_;
-  ShapeModes modes_; ///< displacements to shape
-  std::map<std::uint32_t, Vec3> base_force_;
-  Vec3 base_gravity_;
-  std::vector<double> base_; ///< the shape with all displacements 0, under these; empty: unknown
+  /// What follows from the displaced nodes.
+  struct Held {
+    std::map<std::uint32_t, Vec3> nodes;
+    std::optional<AxisSolver> solver; ///< empty if no axis is free
+    std::optional<ColumnCache> columns;
+    std::map<std::uint32_t, Vec3> base_force;
+    Vec3 base_gravity;
+    std::vector<double> base; ///< the shape with all displacements 0, under these; empty: unknown
+  };
+  Past now_;
   std::uint64_t factors_ = 0, solves_ = 0;
 };
 

@@ -1,5 +1,6 @@
 #include "statics/two_step.h"
 
+#include "base/copy_on_write.h"
 #include "base/error.h"
 #include "geometry/vector_at.h"
 
@@ -197,32 +198,42 @@ TwoStepContact::Answer TwoStepContact::solve(const Problem& problem) const {
 
 // ---- an object
 
-struct TwoStep::State {
+struct TwoStep::Past {
+  /// The last load, its reactions, and its shapes once they were read.
+  struct Last {
+    TwoStepOptions options;
+    CopyOnWrite<std::optional<Load>> last{};
+    CopyOnWrite<std::vector<NodeVector>> forces{};
+    double norm = 0, largest = 0;
+    double s = 1;
+    CopyOnWrite<Load> total{}; // beyond the threshold: all forces, those of contact too
+
+    /// That of `last`, where known.
+    struct Shape {
+      CopyOnWrite<std::vector<double>> u{};
+      bool known = true;
+    };
+    Shape whole{}, surface{}, rough{}; // each is computed when it is read
+
+    std::vector<std::uint32_t> nodes{}; // of contact
+    std::vector<std::size_t> axes{};    // of them, those that are free: 3 k + a for nodes[k]
+    std::shared_ptr<const TwoStepContact> contact{};
+  };
+
+  std::shared_ptr<const Elastostatic::Past> second;
+  Last last;
+};
+
+struct TwoStep::State : Past::Last {
   const Model& model;
   Elastostatic second;
   double tolerance = 0;
-  TwoStepOptions options;
-
-  std::optional<Load> last;
-  std::vector<NodeVector> forces;
-  double norm = 0, largest = 0;
-  double s = 1;
-  Load total; // beyond the threshold: all forces, those of contact too
-
-  /// That of `last`, where known.
-  struct Shape {
-    std::vector<double> u;
-    bool known = true;
-  };
-  Shape whole, surface, rough; // each is computed when it is read
-
-  std::vector<std::uint32_t> nodes; // of contact
-  std::vector<std::size_t> axes;    // of them, those that are free: 3 k + a for nodes[k]
-  std::optional<TwoStepContact> contact;
 
   State(const Model& m, std::shared_ptr<ComplianceSource> source, const Context& context, double t)
-      : model(m), second(m, std::move(source), context, {.tolerance = t}), tolerance(t),
-        whole{std::vector<double>(3 * m.nodes.size())}, surface(whole), rough(whole) {}
+      : model(m), second(m, std::move(source), context, {.tolerance = t}), tolerance(t) {
+    whole.u.write().resize(3 * m.nodes.size());
+    surface = rough = whole;
+  }
 
   using Displacement = std::span<const double> (Elastostatic::*)();
 
@@ -248,7 +259,7 @@ struct TwoStep::State {
         block1.push_back(one.compliance[j * rows + i]);
         block2.push_back(two.compliance[j * rows + i]);
       }
-    contact.emplace(block1, block2, axes.size(), options.series);
+    contact = std::make_shared<const TwoStepContact>(block1, block2, axes.size(), options.series);
     nodes = one.nodes;
   }
 
@@ -277,14 +288,15 @@ struct TwoStep::State {
         contact->solve({d, v1, v2, carried, norm_of(model, load, false), options.threshold});
     if (!(answer.s < 1))
       return false;
-    forces.clear();
+    std::vector<NodeVector> found;
     for (const std::uint32_t node : now)
-      forces.push_back({node, {}});
+      found.push_back({node, {}});
     for (std::size_t k = 0; k < axes.size(); ++k)
-      forces[axes[k] / 3].value[static_cast<int>(axes[k] % 3)] = answer.force[k];
+      found[axes[k] / 3].value[static_cast<int>(axes[k] % 3)] = answer.force[k];
+    for (const NodeVector& f : found)
+      outer.force[f.node] += f.value;
     total = std::move(outer);
-    for (const NodeVector& f : forces)
-      total.force[f.node] += f.value;
+    forces = std::move(found);
     s = answer.s;
     norm = options.threshold / s;
     return true;
@@ -296,7 +308,7 @@ struct TwoStep::State {
       s = norm > options.threshold ? options.threshold / norm : 1;
       if (s < 1)
         total = load;
-      forces.clear();
+      forces = {};
       return;
     }
     if (contact && beyond(first, load))
@@ -314,7 +326,7 @@ struct TwoStep::State {
   }
 
   /// The first stage under what acts.
-  void take_load(Elastostatic& first) const { first.update(s < 1 ? total : *last); }
+  void take_load(Elastostatic& first) const { first.update(s < 1 ? *total : **last); }
 
   void shape(Elastostatic& first, Displacement of, std::vector<double>& u) {
     take_load(first);
@@ -323,7 +335,7 @@ struct TwoStep::State {
       u.assign(u1.begin(), u1.end());
       return;
     }
-    second.update(total);
+    second.update(*total);
     const std::span<const double> u1 = (first.*of)(), u2 = (second.*of)();
     u.resize(std::min(u1.size(), u2.size()));
     const double a = options.series ? s : 1, b = options.series ? 1 - s : s - 1;
@@ -341,7 +353,7 @@ struct TwoStep::State {
   /// The displaced nodes stand exactly where they must.
   void meet(double size, double left_out, std::vector<double>& u) const {
     double miss = 0;
-    for (const auto& [node, d] : last->displacement)
+    for (const auto& [node, d] : (*last)->displacement)
       for (int a = 0; a < 3 && axis_of(node, a) < u.size(); ++a) {
         double& value = u[axis_of(node, a)];
         const double error = std::abs(value - d[a]);
@@ -370,21 +382,30 @@ void TwoStep::set(const TwoStepOptions& options) {
   if (options == state_->options)
     return;
   state_->options = options;
-  state_->last.reset();
+  state_->last = {};
   state_->forget_contact();
   state_->largest = 0;
 }
 
+std::shared_ptr<const TwoStep::Past> TwoStep::past() const {
+  return std::make_shared<const Past>(Past{state_->second.past(), *state_});
+}
+
+void TwoStep::restore(const Past& past) {
+  state_->second.restore(*past.second);
+  static_cast<Past::Last&>(*state_) = past.last;
+}
+
 void TwoStep::update(Elastostatic& first, const Load& load) {
   State& state = *state_;
-  if (state.last == load)
+  if (*state.last == load)
     return;
-  state.last.reset();
+  state.last = {};
   state.update(first, load);
   if (!std::isfinite(state.norm))
     throw Error("the load is not finite, expected a smaller one");
   state.largest = std::max(state.largest, state.norm);
-  state.last = load;
+  state.last = std::optional(load);
   state.whole.known = state.surface.known = state.rough.known = false;
 }
 
@@ -400,11 +421,11 @@ namespace {
 template <class State, class Shape>
 std::span<const double> shape_of(State& state, Elastostatic& first, typename State::Displacement of,
                                  Shape& shape) {
-  if (state.last && !shape.known) {
-    state.shape(first, of, shape.u);
+  if (*state.last && !shape.known) {
+    state.shape(first, of, shape.u.replace());
     shape.known = true;
   }
-  return shape.u;
+  return *shape.u;
 }
 
 } // namespace
@@ -421,13 +442,13 @@ std::span<const double> TwoStep::rough_surface(Elastostatic& first) {
   return shape_of(*state_, first, &Elastostatic::rough_surface, state_->rough);
 }
 void TwoStep::verify(Elastostatic& first) {
-  if (!state_->last)
+  if (!*state_->last)
     return;
   state_->take_load(first);
   first.verify();
 }
 const std::vector<NodeVector>& TwoStep::contact_forces() const noexcept {
-  return state_->forces;
+  return *state_->forces;
 }
 const TwoStepOptions& TwoStep::options() const noexcept {
   return state_->options;

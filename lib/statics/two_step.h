@@ -90,6 +90,11 @@ public:
 
   void set(const TwoStepOptions& options);
 
+  /// As those of Elastostatic, of the second stage and of this object; not of the first stage.
+  struct Past;
+  std::shared_ptr<const Past> past() const;
+  void restore(const Past& past);
+
   /// Computes the forces under `load`. Up to the threshold they are those of `first`, and the
   /// second stage is not used. \pre as Elastostatic::update
   /// \throw Error as Elastostatic::update, and if no force is found for the displacements, see

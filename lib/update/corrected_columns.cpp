@@ -57,15 +57,17 @@ CorrectedColumns::CorrectedColumns(std::shared_ptr<const ColumnSource> before,
 }
 
 bool CorrectedColumns::pays(std::size_t count) const {
-  const int responses = prepared_ ? 0 : solve_before_ ? 2 : 1;
+  const int responses = warm_ ? 0 : solve_before_ ? 2 : 1;
   return count > 0 && (solve_entries_ == 0 ||
                        costs::correcting_columns_pays(3 * count, change_.new_axes, solve_entries_,
                                                       change_.rank(), responses));
 }
 
 void CorrectedColumns::prepare() const {
-  if (prepared_)
+  if (prepared_) {
+    warm_ = true;
     return;
+  }
   response_ = packed(change_response(change_, solve_, context_), change_.new_axes, change_.rank());
   if (solve_before_) {
     answers_.assign(change_.old_axes * change_.rank(), 0.0);
@@ -74,7 +76,7 @@ void CorrectedColumns::prepare() const {
                             std::span(answers_).subspan(k * change_.old_axes, change_.old_axes));
     solve_before_(answers_, change_.rank());
   }
-  prepared_ = true;
+  prepared_ = warm_ = true;
 }
 
 void CorrectedColumns::read(std::size_t k, std::span<double> out) const {

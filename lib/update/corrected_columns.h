@@ -46,6 +46,9 @@ public:
   /// with the same bytes. \pre out.size() == 9 n count
   void read(std::size_t first, std::size_t count, std::span<double> out) const;
 
+  /// Whether the responses count as known, see ComplianceSource::is_warm.
+  bool is_warm() const noexcept { return warm_; }
+  void set_warm(bool warm) noexcept { warm_ = warm; }
   const StiffnessChange& change() const noexcept { return change_; }
   /// Largest factor by which the correction amplifies an error in an entry of an earlier column; 1
   /// if solve_before is given. Solves if nothing was read yet.
@@ -61,7 +64,7 @@ private:
   Context context_;
   std::vector<std::uint32_t> nodes_;
   std::vector<std::size_t> stored_; ///< by nodes_: its place in before_->nodes()
-  mutable bool prepared_ = false;
+  mutable bool prepared_ = false, warm_ = false;
   mutable std::vector<double> response_; ///< C' W, packed as ResponseSum takes it
   mutable std::vector<double> answers_;  ///< C Q, [rank][3 n], if solve_before is given
 };

@@ -8,9 +8,7 @@
 #include "linalg/condition.h"
 #include "linalg/factor.h"
 #include "linalg/stiffness.h"
-#include "numeric/larger.h"
 #include "update/corrected_columns.h"
-#include "update/node_stiffness.h"
 
 #include <algorithm>
 #include <cmath>
@@ -64,35 +62,6 @@ void tell_what_moves(const Model& model, const Context& context) {
   (void)checked_factor(model, matrix, context, check);
 }
 
-/// A bound of ‖K‖₁. Cuts leave no spring stiffer than it was.
-double stiffness_bound(const Model& model) {
-  std::vector<double> sum(model.nodes.size());
-  double max = 0;
-  for (const Spring& s : model.springs) {
-    const SymmetricBlock b = stiffness_block(model, s);
-    const double largest = std::max({std::abs(b[0]) + std::abs(b[1]) + std::abs(b[2]),
-                                     std::abs(b[1]) + std::abs(b[3]) + std::abs(b[4]),
-                                     std::abs(b[2]) + std::abs(b[4]) + std::abs(b[5])});
-    for (const std::uint32_t i : {s.i, s.j}) {
-      sum[i] += 2 * largest; // on the diagonal and beside it
-      max = sum[i] <= max ? max : sum[i];
-    }
-  }
-  return max;
-}
-
-/// ‖K‖₁, where the norms of these rows are others. \param norms by node
-double follow_norms(const NodeMatrix& matrix, std::span<const std::uint32_t> rows,
-                    std::vector<double>& norms) {
-  norms.resize(matrix.nodes());
-  for (const std::uint32_t row : rows)
-    norms[row] = row_norm(matrix, row);
-  double norm = 0;
-  for (const double of_row : norms)
-    norm = larger(norm, of_row);
-  return norm;
-}
-
 /// The factor of a cut model, or one before that is corrected; columns of the first model, to be
 /// corrected; blocks where the factor is that of the model.
 class CutSource final : public ComplianceSource {
@@ -109,6 +78,11 @@ public:
   std::size_t entries() const override { return entries_; }
   const ColumnSource* columns() const override { return columns_.get(); }
   ForwardBlocks* blocks() override { return blocks_.get(); }
+  bool is_warm() const override { return columns_ != nullptr && columns_->is_warm(); }
+  void set_warm(bool warm) override {
+    if (columns_ != nullptr)
+      columns_->set_warm(warm);
+  }
 
 private:
   AxesSolve solve_;
@@ -130,31 +104,32 @@ CutStiffness::CutStiffness(std::shared_ptr<const Model> first,
 /// its axis then shows how far the free part moves. If that is far, the norm of C is estimated.
 /// \throw SingularStiffness if the condition is too large
 void CutStiffness::require_condition() {
-  const double weakest = factor_->weakest_pivot();
+  const FrontalFactor& factor = factor_->factor();
+  const double weakest = factor.weakest_pivot(), norm = factor_->norm();
   if (weakest > weak_pivot || weakest > 0.5 * accepted_pivot_)
     return;
-  const std::size_t axes = factor_->axes();
+  const std::size_t axes = factor.axes();
   std::vector<double> column(axes);
-  column[factor_->weakest_axis()] = 1;
-  factor_->solve(column);
+  column[factor.weakest_axis()] = 1;
+  factor.solve(column);
   double size = 0;
   for (const double value : column)
     size += std::abs(value);
-  if (!(norm_ * size < max_condition / column_margin)) {
+  if (!(norm * size < max_condition / column_margin)) {
     size = inverse_norm(axes, [&](std::span<const double> x, std::span<double> y) {
       std::copy(x.begin(), x.end(), y.begin());
-      factor_->solve(y);
+      factor.solve(y);
     });
-    if (!(norm_ * size < max_condition / estimate_margin))
+    if (!(norm * size < max_condition / estimate_margin))
       tell_what_moves(*now_, context_);
   }
   accepted_pivot_ = weakest;
 }
 
 /// The factor of now, or none. \throw SingularStiffness naming what moves, and what the work throws
-void CutStiffness::factorise(const std::function<void()>& work) {
+void CutStiffness::factorise(const std::function<std::shared_ptr<const FollowedFactor>()>& work) {
   try {
-    work();
+    factor_ = work();
     require_condition();
   } catch (const NotPositiveDefinite&) {
     factor_.reset();
@@ -169,34 +144,10 @@ void CutStiffness::factorise(const std::function<void()>& work) {
 void CutStiffness::prepare() {
   if (factor_ != nullptr)
     return;
-  if (is_solid()) {
-    matrix_ = node_stiffness(*now_);
-    norm_ = follow_norms(matrix_, identity(matrix_.nodes()), row_norm_);
-    factorise([&] { factor_ = std::make_shared<FrontalFactor>(matrix_, context_); });
-  } else {
-    norm_ = stiffness_bound(*now_);
-    factorise([&] { factor_ = std::make_shared<FrontalFactor>(*now_, context_); });
-  }
-  factored_ = now_;
+  factorise([&] { return std::make_shared<const FollowedFactor>(now_, context_); });
   woodbury_.reset();
   origin_ = place_ = identity(now_->nodes.size());
   fresh_operations_ = factor_->work().all_operations;
-}
-
-/// The matrix of now, from that of factored_. \return the rows that are others
-std::vector<std::uint32_t> CutStiffness::follow_matrix() {
-  std::vector<std::uint32_t> rows = changed_rows(*factored_, *now_, place_);
-  bool stay = true;
-  for (std::uint32_t i = 0; i < place_.size(); ++i)
-    stay = stay && place_[i] == i;
-  if (stay) {
-    update_node_stiffness(matrix_, *now_, rows);
-    norm_ = follow_norms(matrix_, rows, row_norm_);
-  } else {
-    matrix_ = node_stiffness(*now_);
-    norm_ = follow_norms(matrix_, identity(matrix_.nodes()), row_norm_);
-  }
-  return rows;
 }
 
 bool CutStiffness::woodbury_pays(std::size_t rank) const {
@@ -219,16 +170,19 @@ CutWork CutStiffness::cut(std::shared_ptr<const Model> next, std::span<const std
     const bool some_gone = std::find(place_.begin(), place_.end(), CutModel::gone) != place_.end();
     work.rank = 3 * copies(origin_, place_);
     std::optional<StiffnessChange> change;
-    if (!some_gone && !is_solid() && (way ? way == CutWay::woodbury : woodbury_pays(work.rank))) {
-      change = stiffness_change(*factored_, *now_, origin_, place_);
+    const bool is_solid = !now_->tetrahedra.empty();
+    if (!some_gone && !is_solid && (way ? way == CutWay::woodbury : woodbury_pays(work.rank))) {
+      change = stiffness_change(factor_->model(), *now_, origin_, place_);
       work.rank = change->rank();
     }
     if (change && (way || woodbury_pays(work.rank))) {
       try {
-        const std::shared_ptr<const FrontalFactor> factor = factor_;
+        const std::shared_ptr<const FollowedFactor> factor = factor_;
         auto woodbury = std::make_shared<const WoodburySolver>(
             std::move(*change),
-            [factor](std::span<double> f, std::size_t columns) { factor->solve(f, columns); },
+            [factor](std::span<double> f, std::size_t columns) {
+              factor->factor().solve(f, columns);
+            },
             context_);
         if (woodbury->condition() < max_woodbury_condition) {
           woodbury_ = std::move(woodbury);
@@ -243,18 +197,10 @@ CutWork CutStiffness::cut(std::shared_ptr<const Model> next, std::span<const std
     }
     woodbury_.reset();
     if (!costs::order_is_worn_out(factor_->work().all_operations, fresh_operations_)) {
-      ++*generation_;
-      factorise([&] {
-        if (is_solid()) {
-          const std::vector<std::uint32_t> rows = follow_matrix();
-          work.factor = factor_->refactor(matrix_, origin_, place_, rows, context_);
-        } else {
-          work.factor = factor_->refactor(*now_, origin_, place_, context_);
-        }
-      });
+      factorise([&, before = factor_] { return before->follow(now_, origin_, place_, context_); });
+      work.factor = factor_->work();
       work.way = CutWay::refactor;
       reached_ = work.factor.operations;
-      factored_ = now_;
       origin_ = place_ = identity(now_->nodes.size());
       return work;
     }
@@ -265,23 +211,13 @@ CutWork CutStiffness::cut(std::shared_ptr<const Model> next, std::span<const std
   return work;
 }
 
-/// Throws when another cut has changed the factor.
-std::function<void()> CutStiffness::still_valid() const {
-  return [generation = generation_, made = *generation_] {
-    if (*generation != made)
-      throw Error("the object was cut since, expected a call for its new stiffness");
-  };
-}
-
 /// Solves for the model of now.
 AxesSolve CutStiffness::solver() const {
-  return [factor = std::shared_ptr<const FrontalFactor>(factor_), woodbury = woodbury_,
-          check = still_valid()](std::span<double> f, std::size_t columns) {
-    check();
+  return [factor = factor_, woodbury = woodbury_](std::span<double> f, std::size_t columns) {
     if (woodbury != nullptr)
       woodbury->solve(f, columns);
     else
-      factor->solve(f, columns);
+      factor->factor().solve(f, columns);
   };
 }
 
@@ -290,11 +226,12 @@ std::shared_ptr<ComplianceSource> CutStiffness::compliance() const {
   std::size_t entries = factor_->entries();
   std::unique_ptr<ForwardBlocks> blocks;
   if (woodbury_ == nullptr)
-    blocks = std::make_unique<ForwardBlocks>(factor_, still_valid());
+    blocks = std::make_unique<ForwardBlocks>(
+        [factor = factor_]() -> FrontalFactor& { return factor->factor(); });
   else
     entries += woodbury_->change().rank() * factor_->axes();
   std::unique_ptr<CorrectedColumns> columns;
-  if (!is_solid() && source_ != nullptr && source_->columns() != nullptr)
+  if (now_->tetrahedra.empty() && source_ != nullptr && source_->columns() != nullptr)
     columns = std::make_unique<CorrectedColumns>(
         std::shared_ptr<const ColumnSource>(source_, source_->columns()),
         stiffness_change(*first_, *now_, first_origin_, first_place_), solve, context_, AxesSolve{},

@@ -2,11 +2,13 @@
 // Stiffness of an object that is cut repeatedly. After each cut the cheapest method updates the
 // factor, so that solutions stay exact. Stored columns of the uncut net remain in use. A solid's
 // factor is refactored in part, after K was assembled again for the nodes of changed elements.
+// A copy made before a cut stays that of the model before (update/followed_factor.h).
 
 #include "base/context.h"
 #include "compliance/compliance_source.h"
 #include "linalg/frontal_factor.h"
 #include "model/model.h"
+#include "update/followed_factor.h"
 #include "update/woodbury.h"
 
 #include <cstddef>
@@ -50,33 +52,26 @@ public:
   /// bit.
   /// \param way  the method; empty: the cheapest
   /// \throw SingularStiffness that names the free nodes; as FrontalFactor. The object is then
-  /// unusable
+  /// unusable, its copies are not
   CutWork cut(std::shared_ptr<const Model> next, std::span<const std::uint32_t> origin,
               std::span<const std::uint32_t> place, std::optional<CutWay> way = {});
 
-  /// Compliance of the present model, valid until the next cut.
+  /// Compliance of the present model.
   /// \pre cut() or prepare() was called
   std::shared_ptr<ComplianceSource> compliance() const;
 
 private:
-  bool is_solid() const { return !now_->tetrahedra.empty(); }
-  std::vector<std::uint32_t> follow_matrix();
   bool woodbury_pays(std::size_t rank) const;
-  std::function<void()> still_valid() const;
   AxesSolve solver() const;
   void require_condition();
-  void factorise(const std::function<void()>& work);
-  std::shared_ptr<const Model> first_, factored_, now_;
+  void factorise(const std::function<std::shared_ptr<const FollowedFactor>()>& work);
+  std::shared_ptr<const Model> first_, now_;
   std::shared_ptr<const ComplianceSource> source_;
   Context context_;
   std::vector<std::uint32_t> first_origin_, first_place_; ///< from first_ to now_
-  std::vector<std::uint32_t> origin_, place_;             ///< from factored_ to now_
-  NodeMatrix matrix_;                                     ///< of a solid: that of factor_
-  std::vector<double> row_norm_;                          ///< of its nodes
-  std::shared_ptr<FrontalFactor> factor_;
+  std::vector<std::uint32_t> origin_, place_;             ///< from the factor's model to now_
+  std::shared_ptr<const FollowedFactor> factor_;          ///< null: none yet
   std::shared_ptr<const WoodburySolver> woodbury_;
-  std::shared_ptr<std::uint64_t> generation_ = std::make_shared<std::uint64_t>(0); ///< of factor_
-  double norm_ = 0;             ///< bound of ‖K‖₁
   double fresh_operations_ = 0; ///< of the last factor with an order of its own
   double reached_ = 0;          ///< operations of the last refactorisation
   double accepted_pivot_ = 1;   ///< smallest pivot for which the condition was small enough

@@ -97,10 +97,9 @@ test_a_step_that_fails_is_taken_back() {
   [[ $(grep -c 'no longer finite' live) == 2 && $(grep -c 'object d at .* singular' live) == 2 ]] || fail "$(grep ^error live)"
   grep -v '^error ' live >answers
   ffe-run record.scene 2>/dev/null | cmp - answers
-  grep -q '^renew b' record.scene || fail 'no shape was taken back' "$(<record.scene)"
-  # Had it never happened, the moving shape were the same.
+  # Without the steps that fail, the answers are the same.
   cat start rest rest | ffe-run >calm
-  cmp <(head -n 40 answers) <(head -n 40 calm)
+  cmp answers calm
   rm organ.ela loose.ela start bomb rest live answers calm record.scene stderr.txt
 }
 

@@ -376,7 +376,6 @@ private:
       line("emit " +
            of(std::vector<std::string>{"shapes", "surfaces", "forces", "instruments", "all"}));
     } else if (one_in(60)) {
-      line("renew " + object().name);
       line("sync");
     } else if (one_in(50) && objects_.size() < 5) {
       add_object();

@@ -130,7 +130,7 @@ TEST(SceneServe, EveryCommandLeavesTheStateAloneWhereItIsWrong) {
                                        "run 1e30 every 1e-9",
                                        "method a fem",
                                        "method z ela",
-                                       "renew z",
+                                       "prepare z",
                                        "at 0.001 force a 4 1 1 1",
                                        "at 1 step",
                                        "cut a 4",

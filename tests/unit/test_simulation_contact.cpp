@@ -290,10 +290,6 @@ TEST(SimulationContact, AnImplicitStepTakenBackLeavesNoTrace) {
     if (fails) {
       s.schedule(0.015, CutObject{0, PlaneToCut{{{0, 0, 500}, {0, 0, 1}}, {}}});
       EXPECT_THROW(s.step(0.01), Error);
-      EXPECT_EQ(s.take_renewed().size(), 1U);
-      s.apply(Renew{0});
-    } else {
-      s.apply(Renew{0});
     }
     for (int k = 0; k < 2; ++k)
       s.step(0.002);

@@ -273,7 +273,6 @@ TEST(StaticMeetings, TheArmsOfAForkTouch) {
 /// What fails is taken back to the last bit, and what comes behind is as if it had not been.
 TEST(StaticMeetings, WhatFailsIsTakenBack) {
   std::vector<std::vector<double>> shapes;
-  std::vector<std::size_t> renewed;
   for (const bool fails : {true, false}) {
     Simulation s(one_thread(), {.guard = true});
     const Model above = hanging(3, 3, 2, {3.7, 4.1, 8.3});
@@ -289,10 +288,6 @@ TEST(StaticMeetings, WhatFailsIsTakenBack) {
         s.apply(SetForce{1, {lowest[0]}, {1e15, 0, 0}}); // which is noticed when it is found
         EXPECT_THROW(s.step(0.1), Error);
         s.apply(SetForce{1, lowest, {3000.0 * k, 0, -20000.0 * k}});
-        renewed = s.take_renewed();
-      } else if (k == 3) {
-        for (const std::size_t object : renewed)
-          s.apply(Renew{object});
       }
       s.step(0.1);
     }

@@ -219,10 +219,6 @@ public:
       scene_.apply(Prepare{.object = 0, .contact = true, .cut = false, .nodes_ahead = {}});
       scene_.apply(SetForce{0, {top()}, {0, 0, 2000}});
       return bends();
-    case Feature::renew:
-      scene_.apply(Renew{0});
-      scene_.apply(SetForce{0, {top()}, {0, 0, 2000}});
-      return bends();
     }
     return false;
   }

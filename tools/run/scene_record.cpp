@@ -110,10 +110,6 @@ void SceneRecord::line(std::string_view text, const Command& command,
   write(scene_line(words));
 }
 
-void SceneRecord::renew(const std::string& object) {
-  write("renew " + object);
-}
-
 void SceneRecord::run(double until, double every) {
   write("run " + number_text(until) + " every " + number_text(every));
 }

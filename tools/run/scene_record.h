@@ -22,8 +22,7 @@ public:
   /// record has the numbers instead   \throw Error
   void line(std::string_view text, const Command& command,
             const std::map<std::string, std::string>& lists);
-  /// What happened without one.
-  void renew(const std::string& object);
+  /// The part of a `run` that was carried out before it failed.
   void run(double until, double every);
   /// It appears. \throw Error
   void commit();

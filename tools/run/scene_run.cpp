@@ -167,12 +167,8 @@ void SceneRun::State::refuse(const LinePlace& at, const std::string& text) {
   if (counts.errors == 1)
     first_error = Error(named(at), text);
   deliver([&] {
-    if (options.record != nullptr) {
-      if (under_way)
-        options.record->run(under_way->until, under_way->every);
-      for (const std::size_t object : simulation.take_renewed())
-        options.record->renew(simulation.object(object).name);
-    }
+    if (options.record != nullptr && under_way)
+      options.record->run(under_way->until, under_way->every);
     if (options.events != nullptr) {
       options.events->drop();
       const std::string client =
