@@ -43,6 +43,14 @@ std::vector<CellSet> cells_at_solid(const Context& context, const StuffingBlocks
   return result;
 }
 
+/// How often the edge is halved until it is at most `cell`, which is above 0.
+unsigned halvings(double edge, double cell) {
+  unsigned count = 0;
+  while (std::ldexp(edge, -static_cast<int>(count)) > cell * (1 + 1e-9))
+    ++count;
+  return count;
+}
+
 } // namespace
 
 RefinedCells::RefinedCells(const Grid& grid, const StuffingLattice& lattice,
@@ -54,10 +62,7 @@ RefinedCells::RefinedCells(const Grid& grid, const StuffingLattice& lattice,
                   " mm already, expected a smaller size");
     if (!region.materials.empty() && !materials_)
       throw Error("refine '" + region.text + "': the solid has no labels, expected materials");
-    unsigned halvings = 0;
-    for (double edge = lattice.cell; edge > region.cell * (1 + 1e-9); edge /= 2)
-      ++halvings;
-    levels_ = std::max(levels_, halvings);
+    levels_ = std::max(levels_, halvings(lattice.cell, region.cell));
   }
   if (levels_ > refined_levels_max)
     throw Error("refine: cells of " + number_text(lattice.cell) + " mm would be halved " +
@@ -154,10 +159,8 @@ bool RefinedCells::has_inside(const Vec3& first, Probe& probe) const {
       finest = std::fmin(finest, region.cell);
   if (!std::isfinite(finest))
     return false;
-  unsigned halvings = 0;
-  for (double edge = lattice_.cell; edge > finest * (1 + 1e-9); edge /= 2)
-    ++halvings;
-  const int count = 2 << halvings; // steps of half a cell: corners and centres
+  const int count =
+      2 << halvings(lattice_.cell, finest); // steps of half a cell: corners and centres
   const double step = 1.0 / count;
   for (int i = 0; i <= count; ++i)
     for (int j = 0; j <= count; ++j)
