@@ -45,6 +45,8 @@ int main(int argc, char** argv) {
       .option("--cell", arguments.cell, "S",
               "with --tets: cells of S mm, each of 12 tetrahedra (default: the voxel)")
       .positive();
+  program.option("--refine", arguments.refine, "SELECTOR:SIZE[;...]",
+                 "with --tets: cells of at most SIZE mm there, such as sphere:0,0,50,8:2");
   program.option("--grade", arguments.grade, "G", "with --tets: cells double inwards up to G times")
       .range(0, stuffing_grade_max);
   program.option(

@@ -6,6 +6,7 @@
 #include "base/context.h"
 #include "geometry/mesh.h"
 #include "shading/volume_view.h"
+#include "tetrahedra/refinement.h"
 #include "tetrahedra/tet_mesh.h"
 #include "voxelization/voxelize.h"
 
@@ -28,6 +29,7 @@ struct SurfaceFilling {
   std::vector<std::int32_t> parts = {};
   VoxelRule rule = VoxelRule::parity;
   OpenMesh on_open = OpenMesh::refuse;
+  std::vector<RefinedRegion> refine = {}; ///< as in StuffingOptions; not with parts of their own
 };
 
 /// Tetrahedra that fill a surface: jones_density (antialiasing/distance_ramp.h) on voxels at

@@ -75,7 +75,8 @@ FilledSurface fill(const TriangleMesh& mesh, const SurfaceFilling& filling,
     }
   if (const TriangleMesh rest = triangles_of(mesh, filling.parts, false); !rest.triangles.empty())
     add(rest, filling.parts.size());
-  StuffingOptions options{.isovalue = {}, .cell = filling.cell, .grade = filling.grade};
+  StuffingOptions options{
+      .isovalue = {}, .cell = filling.cell, .grade = filling.grade, .refine = filling.refine};
   if (filling.parts.empty()) {
     FilledSurface filled{stuff(context, bodies[0].density, options), {}, {bodies[0].found}};
     filled.volumes.push_back({bodies[0].volume, volume(filled.mesh)});

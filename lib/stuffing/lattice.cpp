@@ -233,7 +233,8 @@ StuffingLattice stuffing_lattice(const Grid& grid, std::optional<double> isovalu
 }
 
 StuffingBlocks stuffing_blocks(const Context& context, const Grid& grid,
-                               const StuffingLattice& lattice) {
+                               const StuffingLattice& lattice,
+                               const std::function<bool(const Int3&)>& keep) {
   Context quiet = context;
   quiet.progress = nullptr;
   const std::vector<Int3> origins = candidates(quiet, grid, lattice);
@@ -251,7 +252,7 @@ StuffingBlocks stuffing_blocks(const Context& context, const Grid& grid,
   // Those with a point inside, and their neighbours, which own the other ends of its edges.
   std::vector<Int3> kept;
   for (const StuffingBlock& block : sampled)
-    if (size(block.inside) != 0)
+    if (size(block.inside) != 0 || (keep && keep(block.origin)))
       for (int x = -1; x <= 1; ++x)
         for (int y = -1; y <= 1; ++y)
           for (int z = -1; z <= 1; ++z)

@@ -11,6 +11,7 @@
 #include <bit>
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <optional>
 #include <vector>
 
@@ -149,9 +150,12 @@ std::uint64_t shifted_word(const StuffingBlocks& blocks, const StuffingBlock& bl
   return step[1] > 0 ? row(0) >> 8 | row(1) << 56 : row(0) << 8 | row(-1) >> 56;
 }
 
+/// \param keep  if given, selects blocks near the volume by their origins that are kept without a
+/// point inside
 /// \throw Error if a value that is looked at is not finite; if indices come near the limits of 32
 /// bits; beyond context.max_memory
 StuffingBlocks stuffing_blocks(const Context& context, const Grid& grid,
-                               const StuffingLattice& lattice);
+                               const StuffingLattice& lattice,
+                               const std::function<bool(const Int3&)>& keep = {});
 
 } // namespace gewebe

@@ -11,10 +11,6 @@ namespace {
 
 using Nodes = std::array<StencilNode, 4>;
 
-constexpr bool is_long(unsigned i, unsigned j) {
-  return i / 2 == j / 2;
-}
-
 Vec3 place(const StencilNode& node) {
   const auto corner = [](unsigned i) {
     return bcc::position(bcc::cell_point(bcc::cell_tetrahedra[0][i]));
@@ -29,13 +25,10 @@ void add(std::vector<Nodes>& tetrahedra, Nodes nodes) {
 }
 
 /// Of two inner corners of a face with the outer corner n the one at which the diagonal of the
-/// quadrilateral between starts. It depends on the face alone, so that both tetrahedra at it agree.
-unsigned diagonal_corner(unsigned p, unsigned q, unsigned n, const std::array<bool, 4>& even) {
-  if (is_long(p, n))
-    return q; // the diagonal ends at the cut point on the long edge
-  if (is_long(q, n))
-    return p;
-  return even[p] ? p : q; // of one long edge: exactly one is even (parity rule)
+/// quadrilateral between starts. It depends on the face alone, so that both tetrahedra at it agree;
+/// for one outer corner it is an order of the inner ones, so that diagonals never go round a prism.
+unsigned diagonal_corner(unsigned p, unsigned q, unsigned n, const DiagonalOrder& order) {
+  return order[n][p] < order[n][q] ? p : q;
 }
 
 /// A prism with triangles `top` and `bottom`, node k over node k; from[i][j] says that the
@@ -80,9 +73,9 @@ std::vector<Nodes> one_piece(const Corners& corners) {
 }
 
 /// Two inner corners, one outer, one on the surface: a pyramid over the face without the latter.
-std::vector<Nodes> pyramid(const Corners& corners, const std::array<bool, 4>& even) {
+std::vector<Nodes> pyramid(const Corners& corners, const DiagonalOrder& order) {
   const unsigned p = corners.inner[0], q = corners.inner[1], n = corners.outer[0];
-  const unsigned start = diagonal_corner(p, q, n, even), other = p + q - start;
+  const unsigned start = diagonal_corner(p, q, n, order), other = p + q - start;
   const StencilNode apex = StencilNode::corner(corners.zero[0]), from = StencilNode::corner(start),
                     to = StencilNode::cut(other, n);
   std::vector<Nodes> result;
@@ -92,7 +85,7 @@ std::vector<Nodes> pyramid(const Corners& corners, const std::array<bool, 4>& ev
 }
 
 /// Three inner corners over their cut points.
-std::vector<Nodes> blunt(const Corners& corners, const std::array<bool, 4>& even) {
+std::vector<Nodes> blunt(const Corners& corners, const DiagonalOrder& order) {
   std::array<StencilNode, 3> top{}, bottom{};
   std::array<std::array<bool, 3>, 3> from{};
   const unsigned n = corners.outer[0];
@@ -102,15 +95,14 @@ std::vector<Nodes> blunt(const Corners& corners, const std::array<bool, 4>& even
     bottom[i] = StencilNode::cut(p, n);
     for (std::size_t j = 0; j < 3; ++j)
       if (i != j)
-        from[i][j] = diagonal_corner(p, corners.inner[j], n, even) == p;
+        from[i][j] = diagonal_corner(p, corners.inner[j], n, order) == p;
   }
   return cut_prism(top, bottom, from);
 }
 
 /// Two inner corners, two outer: a wedge along the inner edge. The diagonal of the quadrilateral on
 /// the surface is free; `start` says at which of the first corner's two cut points it starts.
-std::vector<Nodes> wedge(const Corners& corners, const std::array<bool, 4>& even,
-                         std::size_t start) {
+std::vector<Nodes> wedge(const Corners& corners, const DiagonalOrder& order, std::size_t start) {
   const unsigned p = corners.inner[0], q = corners.inner[1];
   std::array<StencilNode, 3> top{StencilNode::corner(p)}, bottom{StencilNode::corner(q)};
   std::array<std::array<bool, 3>, 3> from{};
@@ -118,7 +110,7 @@ std::vector<Nodes> wedge(const Corners& corners, const std::array<bool, 4>& even
     const unsigned n = corners.outer[i - 1];
     top[i] = StencilNode::cut(p, n);
     bottom[i] = StencilNode::cut(q, n);
-    from[0][i] = diagonal_corner(p, q, n, even) == p;
+    from[0][i] = diagonal_corner(p, q, n, order) == p;
     from[i][0] = !from[0][i];
   }
   from[start][3 - start] = true;
@@ -129,21 +121,20 @@ void copy(const std::vector<Nodes>& from, StencilTetrahedra& to) {
   std::copy(from.begin(), from.end(), to.begin());
 }
 
-Stencil make_stencil(const std::array<int, 4>& signs, bool even0, bool even2) {
+Stencil make_stencil(const std::array<int, 4>& signs, const DiagonalOrder& order) {
   Corners corners;
   for (unsigned i = 0; i < 4; ++i)
     (signs[i] > 0 ? corners.inner : signs[i] == 0 ? corners.zero : corners.outer).push_back(i);
-  const std::array<bool, 4> even{even0, !even0, even2, !even2};
   std::vector<Nodes> tetrahedra, other;
   if (corners.inner.size() == 1 || (!corners.inner.empty() && corners.outer.empty()))
     tetrahedra = one_piece(corners);
   else if (corners.inner.size() == 2 && corners.outer.size() == 1)
-    tetrahedra = pyramid(corners, even);
+    tetrahedra = pyramid(corners, order);
   else if (corners.inner.size() == 3)
-    tetrahedra = blunt(corners, even);
+    tetrahedra = blunt(corners, order);
   else if (corners.inner.size() == 2) {
-    tetrahedra = wedge(corners, even, 1);
-    other = wedge(corners, even, 2);
+    tetrahedra = wedge(corners, order, 1);
+    other = wedge(corners, order, 2);
     if (tetrahedra.empty())
       tetrahedra.swap(other);
   }
@@ -155,32 +146,107 @@ Stencil make_stencil(const std::array<int, 4>& signs, bool even0, bool even2) {
   return result;
 }
 
-std::size_t number(const std::array<int, 4>& signs, bool even0, bool even2) {
+/// Order of the body-centred lattice. A diagonal ends at the cut point on a long edge; of two short
+/// ones it starts at the even corner (of one long edge exactly one is even: parity rule).
+DiagonalOrder lattice_order(bool even0, bool even2) {
+  const std::array<bool, 4> even{even0, !even0, even2, !even2};
+  DiagonalOrder order{};
+  for (unsigned n = 0; n < 4; ++n)
+    for (unsigned p = 0; p < 4; ++p)
+      order[n][p] = p / 2 == n / 2 ? 2 : even[p] ? 0 : 1;
+  return order;
+}
+
+std::size_t number(const std::array<int, 4>& signs, std::size_t variant, std::size_t variants) {
   std::size_t key = 0;
   for (const int sign : signs)
     key = 3 * key + static_cast<std::size_t>(sign + 1);
-  return 4 * key + 2 * static_cast<std::size_t>(even0) + static_cast<std::size_t>(even2);
+  return variants * key + variant;
 }
 
-constexpr std::size_t stencils = std::size_t{4} * 81;
+template <class Visit>
+void for_each_signs(Visit&& visit) {
+  for (int n = 0; n < 81; ++n)
+    visit(std::array<int, 4>{n / 27 - 1, n / 9 % 3 - 1, n / 3 % 3 - 1, n % 3 - 1});
+}
 
-std::array<Stencil, stencils> make_stencils() {
-  std::array<Stencil, stencils> result{};
-  for (int a = -1; a <= 1; ++a)
-    for (int b = -1; b <= 1; ++b)
-      for (int c = -1; c <= 1; ++c)
-        for (int d = -1; d <= 1; ++d)
-          for (const bool even0 : {false, true})
-            for (const bool even2 : {false, true})
-              result[number({a, b, c, d}, even0, even2)] = make_stencil({a, b, c, d}, even0, even2);
+std::array<Stencil, std::size_t{4} * 81> make_lattice_stencils() {
+  std::array<Stencil, std::size_t{4} * 81> result{};
+  for_each_signs([&](const std::array<int, 4>& signs) {
+    for (const bool even0 : {false, true})
+      for (const bool even2 : {false, true})
+        result[number(signs, 2U * even0 + even2, 4)] =
+            make_stencil(signs, lattice_order(even0, even2));
+  });
+  return result;
+}
+
+/// The permutations of four corners, by number.
+std::vector<std::array<std::uint8_t, 4>> permutations() {
+  std::vector<std::array<std::uint8_t, 4>> result;
+  std::array<std::uint8_t, 4> one{0, 1, 2, 3};
+  do
+    result.push_back(one);
+  while (std::next_permutation(one.begin(), one.end()));
+  return result;
+}
+
+/// What distinguishes the orders for given signs: of each pair of inner corners and each outer one,
+/// which comes first. At most three such questions have a meaning for one pattern of signs.
+std::size_t answers(const std::array<int, 4>& signs, const DiagonalOrder& order) {
+  std::size_t bits = 0, count = 0;
+  for (unsigned n = 0; n < 4; ++n)
+    for (unsigned p = 0; signs[n] < 0 && p < 4; ++p)
+      for (unsigned q = p + 1; signs[p] > 0 && q < 4; ++q)
+        if (signs[q] > 0 && count < 3)
+          bits |= static_cast<std::size_t>(order[n][p] < order[n][q]) << count++;
+  return bits;
+}
+
+std::array<Stencil, std::size_t{8} * 81> make_ordered_stencils() {
+  std::array<Stencil, std::size_t{8} * 81> result{};
+  const auto all = permutations();
+  for_each_signs([&](const std::array<int, 4>& signs) {
+    for (const auto& one : all)
+      for (const auto& two : all) {
+        // Two outer corners have orders of their own; more have no quadrilateral.
+        DiagonalOrder order{one, one, one, one};
+        bool first = true;
+        for (std::size_t n = 0; n < 4; ++n)
+          if (signs[n] < 0) {
+            order[n] = first ? one : two;
+            first = false;
+          }
+        result[number(signs, answers(signs, order), 8)] = make_stencil(signs, order);
+      }
+  });
   return result;
 }
 
 } // namespace
 
 const Stencil& stencil(const std::array<int, 4>& signs, bool even0, bool even2) {
-  static const std::array<Stencil, stencils> table = make_stencils();
-  return table[number(signs, even0, even2)];
+  static const std::array<Stencil, std::size_t{4}* 81> table = make_lattice_stencils();
+  return table[number(signs, 2U * even0 + even2, 4)];
+}
+
+const Stencil& stencil(const std::array<int, 4>& signs, const DiagonalOrder& order) {
+  static const std::array<Stencil, std::size_t{8}* 81> table = make_ordered_stencils();
+  return table[number(signs, answers(signs, order), 8)];
+}
+
+double least_angle_cosine(const std::array<Vec3, 4>& p) {
+  std::array<Vec3, 4> normals;
+  for (std::size_t f = 0; f < 4; ++f) {
+    const auto& face = tetrahedron_faces[f];
+    const Vec3 normal = cross(p[face[1]] - p[face[0]], p[face[2]] - p[face[0]]);
+    normals[f] = normal / norm(normal);
+  }
+  double largest = -1;
+  for (std::size_t f = 0; f < 4; ++f)
+    for (std::size_t g = 0; g < f; ++g)
+      largest = std::max(largest, -dot(normals[f], normals[g]));
+  return largest;
 }
 
 } // namespace gewebe

@@ -2,6 +2,8 @@
 // The stencils of isosurface stuffing (Labelle and Shewchuk 2007, figure 3): what is inside of a
 // tetrahedron of the lattice, by the signs of its corners. For the room and its tests.
 
+#include "geometry/vec3.h"
+
 #include <array>
 #include <cstddef>
 #include <cstdint>
@@ -37,5 +39,15 @@ struct Stencil {
 /// \param even of each corner: are the coordinates of its point in its own lattice of even sum? Of
 /// both ends of a long edge one is, so that of 0 and 2 say all.
 const Stencil& stencil(const std::array<int, 4>& signs, bool even0, bool even2);
+
+/// For an outer corner n, order[n][p] of the inner corners: the diagonal of the quadrilateral in
+/// the face (p, q, n) starts at the first of p and q. They differ.
+using DiagonalOrder = std::array<std::array<std::uint8_t, 4>, 4>;
+
+/// The stencil of any tetrahedron of positive volume.
+const Stencil& stencil(const std::array<int, 4>& signs, const DiagonalOrder& order);
+
+/// The cosine of the least dihedral angle.
+double least_angle_cosine(const std::array<Vec3, 4>& corners);
 
 } // namespace gewebe

@@ -2,12 +2,15 @@
 
 #include "base/error.h"
 #include "base/parallel.h"
+#include "stuffing/background_internal.h"
 #include "stuffing/bcc_internal.h"
 #include "stuffing/cutter_internal.h"
 #include "stuffing/grading_internal.h"
 #include "stuffing/interface_internal.h"
 #include "stuffing/lattice_internal.h"
+#include "stuffing/materials.h"
 #include "stuffing/numbering_internal.h"
+#include "stuffing/refined_octree_internal.h"
 #include "stuffing/stencils_internal.h"
 #include "stuffing/warp_internal.h"
 
@@ -24,20 +27,6 @@ namespace gewebe {
 namespace {
 
 constexpr std::size_t blocks_at_once = 8;
-
-double least_angle_cosine(const std::array<Vec3, 4>& p) {
-  std::array<Vec3, 4> normals;
-  for (std::size_t f = 0; f < 4; ++f) {
-    const auto& face = tetrahedron_faces[f];
-    const Vec3 normal = cross(p[face[1]] - p[face[0]], p[face[2]] - p[face[0]]);
-    normals[f] = normal / norm(normal);
-  }
-  double largest = -1;
-  for (std::size_t f = 0; f < 4; ++f)
-    for (std::size_t g = 0; g < f; ++g)
-      largest = std::max(largest, -dot(normals[f], normals[g]));
-  return largest;
-}
 
 /// Is the second of both ways to cut the better one?
 bool other_is_better(const CutTetrahedron& cut, const BlockCutter& cutter, const BlockPoints& block,
@@ -220,6 +209,81 @@ void fill_in(StuffingReport& report, const StuffingParts& parts) {
   }
 }
 
+/// Cells that a node inside has round it but the octree has not, as cubes of the lattice's cells.
+std::vector<OctreeCube> open_cells(const StuffingOctree& octree, const Background& background,
+                                   const std::vector<bool>& inside, unsigned levels) {
+  std::vector<Int3> missing;
+  const auto look = [&](const OctreeCube& cube) {
+    if (octree.covered(cube))
+      return;
+    const unsigned up = levels - cube.level;
+    missing.push_back({cube.cube[0] >> up, cube.cube[1] >> up, cube.cube[2] >> up});
+  };
+  for (std::size_t n = 0; n < inside.size(); ++n) {
+    if (!inside[n])
+      continue;
+    const Background::Node& node = background.nodes[n];
+    const unsigned level = node.level;
+    if (level > levels)
+      continue; // deep inside
+    const auto cube_of = [&](int back) {
+      const auto at = [&](std::size_t a) { return (node.place[a] - back) >> (level + 1); };
+      return OctreeCube{level, {at(0), at(1), at(2)}};
+    };
+    if (node.centre) {
+      const OctreeCube cube = cube_of(0);
+      for (int k = 0; k < 27; ++k)
+        look(cube.neighbour(k / 9 - 1, k / 3 % 3 - 1, k % 3 - 1));
+    } else
+      for (int k = 0; k < 8; ++k)
+        look(cube_of(0).neighbour(-(k & 1), -(k >> 1 & 1), -(k >> 2)));
+  }
+  std::ranges::sort(missing);
+  missing.erase(std::ranges::unique(missing).begin(), missing.end());
+  std::vector<OctreeCube> cells;
+  for (const Int3& cell : missing)
+    cells.push_back({levels, cell});
+  return cells;
+}
+
+TetMesh stuff_refined(const Context& context, const Grid& grid, const StuffingOptions& options,
+                      const StuffingLattice& lattice, StuffingReport& report) {
+  if (options.follow_interface)
+    throw Error("refined cells can't follow the interface between materials, expected stairs");
+  const RefinedCells cells(grid, lattice, options);
+  const unsigned levels = cells.levels();
+  StuffingBlocks blocks = stuffing_blocks(
+      context, grid, lattice, [&](const Int3& origin) { return cells.meets_block(origin); });
+  for (const StuffingBlock& block : blocks)
+    for (const std::int32_t place : block.origin)
+      if (std::abs(std::int64_t{place}) + leaf_dim >= std::int64_t{1} << (28 - levels))
+        throw Error(
+            "the volume has cells beyond index 2^28 of the refined lattice, expected larger "
+            "cells or a volume nearer to its origin");
+  if (options.materials && options.grade > 0)
+    find_interface(context, materials_of(context, lattice, blocks, options.materials), blocks);
+  const Grading grading = grade_blocks(context, blocks, options.grade);
+  StuffingOctree octree = cells.octree(context, blocks, grading);
+  for (;;) {
+    const Background background = background_of(octree, levels + largest_level);
+    std::vector<bool> inside = inside_nodes(context, grid, lattice, background, levels);
+    // What the coarse lattice has not seen of the solid.
+    const std::vector<OctreeCube> open = open_cells(octree, background, inside, levels);
+    if (open.empty()) {
+      cells.require_met(background, inside);
+      const BackgroundSurface surface =
+          warp_background(context, grid, lattice, background, levels, std::move(inside));
+      TetMesh mesh = cut_background(lattice, background, levels, surface, report);
+      if (options.materials)
+        set_materials(context, options.materials, mesh);
+      return mesh;
+    }
+    for (const OctreeCube& cell : open)
+      octree.add(cell);
+    cells.refine(octree);
+  }
+}
+
 } // namespace
 
 TetMesh stuff(const Context& context, const Grid& grid, const StuffingOptions& options,
@@ -230,6 +294,14 @@ TetMesh stuff(const Context& context, const Grid& grid, const StuffingOptions& o
   Context quiet = context;
   quiet.progress = nullptr;
   const StuffingLattice lattice = stuffing_lattice(grid, options.isovalue, options.cell);
+  if (!options.refine.empty()) {
+    StuffingReport made;
+    made.cell = lattice.cell;
+    TetMesh mesh = stuff_refined(quiet, grid, options, lattice, made);
+    if (report != nullptr)
+      *report = made;
+    return mesh;
+  }
   StuffingBlocks blocks = stuffing_blocks(context, grid, lattice);
   const SurfacePoints surface = warp_lattice(context, grid, lattice, blocks);
   BlockMaterials materials;

@@ -2,12 +2,15 @@
 // Tetrahedra from a volume by isosurface stuffing.
 
 #include "base/context.h"
+#include "tetrahedra/refinement.h"
 #include "tetrahedra/tet_mesh.h"
 #include "volume/grid.h"
 
+#include <array>
 #include <cstdint>
 #include <functional>
 #include <optional>
+#include <vector>
 
 namespace gewebe {
 
@@ -17,6 +20,14 @@ namespace gewebe {
 inline constexpr double stuffing_alpha_long = 0.285, stuffing_alpha_short = 0.3985;
 /// Degrees.
 inline constexpr double stuffing_angle_min = 10.7, stuffing_angle_max = 164.8;
+
+/// The same for cells of several sizes at the boundary, for points with cells of different sizes
+/// round them: distances along axes, diagonals of faces and of cubes. They are shares of the edge
+/// of the smallest cell at a corner, or of the cell at its centre. The proof is
+/// tests/unit/test_stuffing_refined_angles.cpp.
+inline constexpr std::array<double, 3> refined_alpha_corner{0.25, 0.2, 0.25},
+    refined_alpha_centre{0.22, 0.2, 0.24};
+inline constexpr double stuffing_refined_angle_min = 1.3, stuffing_refined_angle_max = 175.5;
 
 /// Inside cells can be up to 2^3 times as large.
 inline constexpr unsigned stuffing_grade_max = 3;
@@ -42,6 +53,9 @@ struct StuffingOptions {
   /// Do faces follow the interface between materials? Else a tetrahedron has the material of its
   /// centroid, so that the interface runs along faces of the lattice.
   bool follow_interface = false;
+  /// Where cells are smaller: halved until they are small enough, one step at a time from one cell
+  /// to the next.
+  std::vector<RefinedRegion> refine = {};
 };
 
 struct StuffingReport {
@@ -84,6 +98,14 @@ struct StuffingReport {
 /// The boundary is that of the mesh without materials. Where the interface comes to points beside
 /// the boundary, or three materials meet, it runs along faces of the lattice. The least angle is
 /// stuffing_interface_angle_min.
+///
+/// With `refine` the leaves of the octree are smaller in its regions, at the boundary too, and
+/// those that share a corner differ by one step at most. The surface then cuts halves of
+/// tetrahedra, halves of pyramids and path tetrahedra as well; the stencils are the same, and
+/// diagonals end at the cut on the longer edge. Points with leaves of one size round them are
+/// warped as above, others over refined_alpha_corner and refined_alpha_centre. The angles lie
+/// between stuffing_refined_angle_min and stuffing_refined_angle_max. The interface between
+/// materials is not followed.
 ///
 /// Nodes on the boundary come first, then lattice points inside, then nodes on interfaces, each in
 /// the order of blocks of 8³ cells by (i, j, k); the mesh does not depend on the number of threads.

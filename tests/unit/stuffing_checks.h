@@ -59,7 +59,8 @@ inline Grid torus(double large, double small, double size) {
 
 /// What stuff() promises of any mesh.
 inline void expect_kept(const TetMesh& mesh, const StuffingReport& report,
-                        double smallest_angle = stuffing_angle_min) {
+                        double smallest_angle = stuffing_angle_min,
+                        double largest_angle = stuffing_angle_max) {
   check_mesh(mesh);
   const TetReport found = examine_tetrahedra(mesh);
   EXPECT_TRUE(found.sound());
@@ -74,7 +75,7 @@ inline void expect_kept(const TetMesh& mesh, const StuffingReport& report,
     return;
   const TetQuality quality = tet_quality(mesh, surface);
   EXPECT_GE(quality.smallest_angle, smallest_angle);
-  EXPECT_LE(quality.largest_angle, stuffing_angle_max);
+  EXPECT_LE(quality.largest_angle, largest_angle);
   EXPECT_GT(quality.smallest_volume, 0);
   EXPECT_EQ(report.cut_nodes + report.warped, report.surface_nodes);
 }

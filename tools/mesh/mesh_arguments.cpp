@@ -22,6 +22,14 @@ void check(const MeshArguments& arguments) {
     throw UsageError("--materials is for --tets, expected both");
   if (!arguments.interface.empty() && arguments.materials.empty())
     throw UsageError("--interface is for --materials, expected both");
+  if (!arguments.tets && !arguments.refine.empty())
+    throw UsageError("--refine is for --tets, expected both");
+  if (!arguments.refine.empty() && arguments.interface == "follow")
+    throw UsageError("--refine: refined cells can't follow the interface between materials, "
+                     "expected --interface stair");
+  for (const RefinedRegion& region : refined_regions(arguments))
+    if (!region.materials.empty() && arguments.materials.empty())
+      throw UsageError("--refine '" + region.text + "': label is for --materials, expected both");
   if (!arguments.labels.empty() && arguments.materials.empty())
     throw UsageError("--label is for --materials, expected both");
   if (!arguments.labels.empty())
@@ -38,6 +46,16 @@ void check(const MeshArguments& arguments) {
   std::vector<std::string> inputs = material_paths(arguments);
   inputs.push_back(arguments.volume);
   cli::check_one_pipe(inputs);
+}
+
+std::vector<RefinedRegion> refined_regions(const MeshArguments& arguments) {
+  if (arguments.refine.empty())
+    return {};
+  try {
+    return parse_refinement(arguments.refine);
+  } catch (const Error& error) {
+    throw UsageError(std::string("--refine: ") + error.what());
+  }
 }
 
 std::vector<std::string> material_paths(const MeshArguments& arguments) {

@@ -2,6 +2,7 @@
 // Command line of mc-opt.
 
 #include "formats/stream/kind.h"
+#include "tetrahedra/refinement.h"
 
 #include <cstdint>
 #include <optional>
@@ -11,7 +12,7 @@
 namespace gewebe {
 
 struct MeshArguments {
-  std::string volume = "-", place, components, materials, interface, labels, space;
+  std::string volume = "-", place, components, materials, interface, labels, space, refine;
   std::optional<double> isovalue, voxel, epsilon, cell;
   std::vector<double> box; // x0 y0 z0 x1 y1 z1
   std::int64_t rounds = 0, grade = 0;
@@ -20,6 +21,9 @@ struct MeshArguments {
 
 /// \throw UsageError for options that don't go together
 void check(const MeshArguments& arguments);
+
+/// The regions of --refine. \throw UsageError for a wrong text
+std::vector<RefinedRegion> refined_regions(const MeshArguments& arguments);
 
 /// The files of --materials. \throw UsageError if one has no name
 std::vector<std::string> material_paths(const MeshArguments& arguments);

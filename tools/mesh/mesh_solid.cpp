@@ -54,9 +54,12 @@ void mesh_solid(cli::Run& run, const MeshArguments& arguments) {
   MaterialVolumes materials(arguments);
   const PreparedVolume prepared = prepare(run, arguments, input);
   run.timed("materials", [&] { materials.read(run, prepared.space); });
-  const StuffingOptions options{
-      prepared.isovalue, arguments.cell, static_cast<unsigned>(arguments.grade),
-      materials.source(prepared.grid, prepared.isovalue), arguments.interface == "follow"};
+  const StuffingOptions options{prepared.isovalue,
+                                arguments.cell,
+                                static_cast<unsigned>(arguments.grade),
+                                materials.source(prepared.grid, prepared.isovalue),
+                                arguments.interface == "follow",
+                                refined_regions(arguments)};
   StuffingReport report;
   TetMesh mesh = at(input.name(), [&] {
     return run.timed("stuff",

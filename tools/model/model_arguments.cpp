@@ -66,6 +66,8 @@ void declare(cli::Program& p, ModelArguments& a) {
       .positive();
   p.flag("--solid", a.solid, "fill a closed surface with tetrahedra");
   p.option("--cell", a.cell, "S", "with --solid: edge of the cells in mm").positive();
+  p.option("--refine", a.refine, "SELECTOR:SIZE[;...]",
+           "with --solid: cells of at most SIZE mm there, such as sphere:0,0,50,8:2");
   p.option("--rule", a.rule, "RULE", "with --solid: when a point is inside: parity, winding")
       .one_of({"parity", "winding"});
   p.option("--on-open", a.on_open, "WHAT",
@@ -115,6 +117,12 @@ void complete(ModelArguments& a) {
   refuse(a.fix == "none" && a.axes != ModelArguments{}.axes,
          "--fix-axes without --fix, expected both");
   refuse(a.cell && !a.solid, "--cell without --solid, expected both");
+  refuse(!a.refine.empty() && !a.solid, "--refine without --solid, expected both");
+  if (!a.refine.empty())
+    a.refined = parsed("--refine", [&] { return parse_refinement(a.refine); });
+  for (const RefinedRegion& region : a.refined)
+    refuse(!region.materials.empty(),
+           "--refine: label is for mc-opt --tets, expected sphere, box or surface");
   refuse(!a.solid && a.rule != ModelArguments{}.rule, "--rule without --solid, expected both");
   refuse(!a.solid && a.on_open != ModelArguments{}.on_open,
          "--on-open without --solid, expected both");

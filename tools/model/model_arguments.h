@@ -6,18 +6,20 @@
 #include "model/primitive.h"
 #include "model/selector.h"
 #include "repair/repair.h"
+#include "tetrahedra/refinement.h"
 #include "tools/cli/cli.h"
 
 #include <cstdint>
 #include <optional>
 #include <string>
+#include <vector>
 
 namespace gewebe {
 
 struct ModelArguments {
   std::string mesh = "-", unit, weld = "auto", material = "generic", name, fix = "none",
               axes = "xyz", primitive, size, repair, materials, fit, rule = "parity",
-              on_open = "error", space, transform, law;
+              on_open = "error", space, transform, law, refine;
   MaterialOverrides values;
   BuildOptions build;
   RepairOptions repairs;
@@ -26,6 +28,7 @@ struct ModelArguments {
   std::optional<double> dt;
   std::int64_t order = 2;     ///< of finite elements
   std::optional<double> cell; ///< of the lattice that fills a surface
+  std::vector<RefinedRegion> refined;
   bool solid = false, no_skin = false, scale_mass = false, list_materials = false;
 };
 

@@ -11,6 +11,7 @@
 #include "text/rounded_text.h"
 #include "tools/cli/filling_rule.h"
 #include "tools/cli/transform_option.h"
+#include "tools/model/solid_cell.h"
 
 #include <algorithm>
 #include <cmath>
@@ -110,13 +111,29 @@ void warn_of_pieces(Run& run, const std::string& name, const TetMesh& mesh) {
            "without loose parts (mc-opt --components largest)");
 }
 
-constexpr double tetrahedra_per_cell = 12; // of a body-centred lattice
-constexpr double usual_tetrahedra = 10000; // without a grade
 constexpr unsigned usual_grade = 1;
 constexpr double voxels_per_cell = 2;
+constexpr double most_voxel_halvings = 16;  // of the cells' size, for refined ones
 constexpr double least_share = 0.1;         // of the box of an organ that is filled
 constexpr double told_loss = 0.02;          // of the volume
 constexpr std::int32_t unnamed = INT32_MAX; // no part that --material can name
+
+void warn_of_thickness(Run& run, const std::string& name, const SolidCell& chosen, double volume) {
+  const double wanted = chosen.thickness / 2;
+  run.warn(name + ": the mean thickness is " + rounded_text(chosen.thickness) + " mm, cells of " +
+           rounded_text(chosen.cell) + " mm are less than two across it, expected --cell " +
+           rounded_text(wanted) + " (about " +
+           rounded_text(tetrahedra_per_cell * volume / (wanted * wanted * wanted)) +
+           " tetrahedra) where it bends");
+}
+
+/// Small cells need the surface at their size.
+double finest_voxel(double cell, const std::vector<RefinedRegion>& refined) {
+  double finest = cell;
+  for (const RefinedRegion& region : refined)
+    finest = std::fmin(finest, region.cell);
+  return std::fmax(finest, cell / most_voxel_halvings) / voxels_per_cell;
+}
 
 void tell_change(Run& run, const std::string& what, double cell,
                  const FilledSurface::Volume& volume) {
@@ -156,21 +173,29 @@ Model filled_surface(Run& run, const std::string& name, const TriangleMesh& mesh
   const VoxelizeOptions rule{.rule = voxel_rule_from_text(a.rule),
                              .on_open = open_mesh_from_text(a.on_open)};
   double volume = std::abs(signed_volume(mesh));
+  double area = surface_area(mesh);
   if (rule.rule != VoxelRule::parity || rule.on_open != OpenMesh::refuse) {
+    area = 0; // parts that overlap say nothing about the thickness
     // Parts that are turned inward or open can take all of it away.
     const Vec3 box = bounding_box(mesh).size();
     volume = std::max(volume, least_share * box.x * box.y * box.z);
   }
-  const double cell = a.cell.value_or(std::cbrt(tetrahedra_per_cell * volume / usual_tetrahedra));
+  const SolidCell chosen = default_cell(volume, area);
+  const double cell = a.cell.value_or(chosen.cell);
   return at(name, [&] {
     if (!(cell > 0 && std::isfinite(cell)))
       throw Error("the surface has no volume, expected a closed one");
     const std::vector<std::int32_t> parts =
         mesh.part.empty() ? std::vector<std::int32_t>{} : a.build.material.named;
+    refuse(
+        !parts.empty() && !a.refined.empty(),
+        "--refine: refined cells can't follow the interface between parts, expected one material "
+        "for all");
     FilledSurface filled = run.timed("fill", [&] {
-      return fill_surface(
-          mesh, name, {cell / voxels_per_cell, cell, usual_grade, parts, rule.rule, rule.on_open},
-          run.context());
+      return fill_surface(mesh, name,
+                          {finest_voxel(cell, a.refined), cell, usual_grade, parts, rule.rule,
+                           rule.on_open, a.refined},
+                          run.context());
     });
     for (const VoxelizeReport& found : filled.found)
       if (const std::string defects = mesh_defects(found, rule); !defects.empty())
@@ -179,6 +204,10 @@ Model filled_surface(Run& run, const std::string& name, const TriangleMesh& mesh
     if (tets.tetrahedra.empty())
       throw Error("no cell of " + number_text(cell) + " mm lies inside, expected a smaller --cell");
     run.stats().set("cell", cell);
+    if (area > 0)
+      run.stats().set("mean_thickness", chosen.thickness);
+    if (!a.cell && chosen.capped)
+      warn_of_thickness(run, name, chosen, volume);
     double of_surface = std::abs(signed_volume(mesh));
     if (of_surface < volume) { // what was found to be inside it
       of_surface = 0;

@@ -16,8 +16,8 @@ namespace gewebe::cli {
 /// if an option was given that says nothing of tetrahedra; Error if the mesh isn't sound
 Model solid_source(Run& run, Input& input, Kind kind, const ModelArguments& a);
 
-/// Fills a closed surface: a volume of it is stuffed with tetrahedra of cells of a.cell, or of a
-/// size that makes about ten thousand, which is reported. \throw UsageError as above; Error as
+/// Fills a closed surface: a volume of it is stuffed with tetrahedra of cells of a.cell, or of
+/// default_cell(), which is reported. \throw UsageError as above; Error as
 /// voxelize and stuff, or if nothing is left of it
 Model filled_surface(Run& run, const std::string& name, const TriangleMesh& mesh,
                      const ModelArguments& a);

@@ -98,6 +98,7 @@ void SceneRun::State::answer() {
       simulation, simulation.settings().emits.any_shapes() || options.result != nullptr,
       [this](const std::string& text) { warn(text); },
       [this](const std::string& text) { distrust(text); });
+  instrument_check.look(simulation, [this](const std::string& text) { warn(text); });
   stress.find(simulation, gravity);
   const std::vector<EstimateAnswer> estimated =
       options.estimate ? estimates.find(simulation, gravity) : std::vector<EstimateAnswer>{};

@@ -8,6 +8,7 @@
 #include "tools/results/scene_result.h"
 #include "tools/results/scene_shapes.h"
 #include "tools/results/scene_stress.h"
+#include "tools/run/instrument_check.h"
 #include "tools/run/scene_checks.h"
 #include "tools/run/scene_run.h"
 
@@ -49,6 +50,7 @@ struct SceneRun::State {
   std::optional<RunCommand> under_way;      // of a run of several steps, as far as it came
   Error first_error{""};
   SceneChecks checks;
+  InstrumentCheck instrument_check;
   SceneStress stress;
   SceneEstimates estimates;
   Vec3 gravity, answered_gravity; ///< now, and at the last answer or accepted line
