@@ -15,6 +15,7 @@
 #include <array>
 #include <cmath>
 #include <span>
+#include <utility>
 
 namespace gewebe {
 
@@ -141,10 +142,16 @@ void MotionTangent::make(const MotionObjective& objective, const Numbers& at, bo
           turned(static_cast<Eigen::Index>(n / 3), static_cast<Eigen::Index>(n % 3)) + block[n];
     return block;
   };
-  tangent_ = assembled_matrix(body.mesh, block_of, objective.state().held, context);
+  StiffnessMatrix matrix = assembled_matrix(body.mesh, block_of, objective.state().held, context);
   if (!energy.springs().empty())
-    tangent_ = energy.springs().with_tangent(tangent_, at, 1 / objective.step());
-  add_masses(body, objective.step(), tangent_);
+    matrix = energy.springs().with_tangent(matrix, at, 1 / objective.step());
+  add_masses(body, objective.step(), matrix);
+  make(std::move(matrix), context);
+}
+
+void MotionTangent::make(StiffnessMatrix matrix, const Context& context) {
+  made_ = false;
+  tangent_ = std::move(matrix);
   if (factor_ && factor_->order() == tangent_.order() && !renewed_) {
     factor_->refactor(tangent_, context);
   } else {
