@@ -103,7 +103,7 @@ double MixedSolid::linearise_element(std::size_t t, std::span<const double> u,
   const auto order = static_cast<Eigen::Index>(3 * nodes_);
   const Eigen::Map<const FullMatrix> k(response.tangent.data());
   if (positive > 0 && !is_positive(k, order + (quadratic ? 3 : 0))) {
-    const std::array<double, 9 * 11 * 11> tangent = response.tangent;
+    const auto tangent = response.tangent;
     respond(HyperelasticPart::positive_tangent);
     for (std::size_t n = 0; n < tangent.size(); ++n)
       response.tangent[n] = (1 - positive) * tangent[n] + positive * response.tangent[n];

@@ -150,18 +150,20 @@ public:
   void take_step(Mixed& x, Mixed& by, double& part) {
     const double whole = length(by), slope = slope_;
     const bool downhill = following_.empty() && !moves_held(x.at);
-    for (; part > least_part; part /= 2) {
+    while (part > least_part) {
       Mixed next = x;
       add(next, part, by);
       if (part == 1)
         reach_target(next.at);
       Mixed correction = correct(next);
-      const bool is_near = !correction.at.empty() && length(correction) <= (1 - part / 4) * whole;
-      if (is_near || (downhill && here_ <= value_ - 1e-4 * part * slope + unsure_)) {
+      const bool is_near = length(correction) <= (1 - part / 4) * whole;
+      if (!correction.at.empty() &&
+          (is_near || (downhill && here_ <= value_ - 1e-4 * part * slope + unsure_))) {
         x = std::move(next);
         by = std::move(correction);
         return;
       }
+      part /= 2;
     }
     part = 0;
   }
