@@ -20,7 +20,7 @@ namespace {
 /// What is left of the way to a shape, over the displacement: a hundredth of what contact and the
 /// quickest readers of results (single precision, forces within 1e-4) resolve.
 constexpr double tolerance_at_rest = 1e-6;
-constexpr int max_rounds = 60;
+constexpr int max_rounds = 400;
 /// Of the volume, inside out: a shape with more is none, as in
 /// integrator/motion_recovery_internal.h. Coarse elements at sharp folds may be so in the shape of
 /// least energy.
@@ -59,6 +59,7 @@ Load part_of_way(const Model& model, const Load& from, const Load& to,
 struct SolidStatic::State {
   const Model& model;
   Context context;
+  SolidLaw law;
   std::vector<double> rest; // places
   SolidMotion engine;
   std::vector<std::uint8_t> held; // of the engine
@@ -82,8 +83,8 @@ struct SolidStatic::State {
     return options;
   }
 
-  State(const Model& m, SolidLaw law, const Context& c)
-      : model(m), context(c), engine(element_mesh(m), element_materials(m), options(law), c),
+  State(const Model& m, SolidLaw l, const Context& c)
+      : model(m), context(c), law(l), engine(element_mesh(m), element_materials(m), options(l), c),
         typical(contact::typical_contact(m)) {
     for (const Node& node : m.nodes)
       rest.insert(rest.end(), {node.position.x, node.position.y, node.position.z});
@@ -93,19 +94,26 @@ struct SolidStatic::State {
 
   // ---- loads
 
-  /// All forces on the 3 n axes, with nodes at these places.
-  std::vector<double> forces(const Load& load, std::span<const double> places) {
+  /// Forces on the 3 n axes but those that follow.
+  std::vector<double> dead_forces(const Load& load) {
     if (weighed != load.gravity) {
       weight = weight_of(model, load.gravity);
       weighed = load.gravity;
     }
     std::vector<double> all = weight;
+    for (const auto& [node, force] : load.force)
+      for (int a = 0; a < 3; ++a)
+        all[axis_of(node, a)] += force[a];
+    return all;
+  }
+
+  /// All of them, with nodes at these places.
+  std::vector<double> forces(const Load& load, std::span<const double> places) {
+    std::vector<double> all = dead_forces(load);
     const auto add = [&](std::uint32_t node, const Vec3& force) {
       for (int a = 0; a < 3; ++a)
         all[axis_of(node, a)] += force[a];
     };
-    for (const auto& [node, force] : load.force)
-      add(node, force);
     if (!load.pressure.empty())
       press(
           pressed_corners(load, model), 0,
@@ -189,8 +197,35 @@ struct SolidStatic::State {
     return step.left <= tolerance_at_rest;
   }
 
+  /// The same forces of pressures as forces() has.
+  std::vector<FollowingForce> following(const Load& load) const {
+    std::vector<FollowingForce> all;
+    for (const PressedCorner& c : pressed_corners(load, model))
+      for (std::uint32_t k = 0; k < c.count; ++k)
+        all.push_back({.node = c.bearers[k],
+                       .triangle = c.triangle,
+                       .factor = c.pressure.pressure / 6 / static_cast<double>(c.count)});
+    return all;
+  }
+
+  /// As find, of hyperelastic elements: pressures are those of each round's shape.
+  bool find_hyperelastic(const Load& load, std::span<const double> places) {
+    begin(load, places);
+    engine.set_load(dead_forces(load));
+    engine.follow(following(load));
+    const bool found = settle() && !is_inside_out();
+    engine.follow({});
+    if (found && !load.pressure.empty()) {
+      engine.set_load(forces(load, engine.places()));
+      engine.find_reactions(context);
+    }
+    return found;
+  }
+
   /// From places to the shape under a load. \return whether it was found
   bool find(const Load& load, std::span<const double> places) {
+    if (law == SolidLaw::hyperelastic)
+      return find_hyperelastic(load, places);
     begin(load, places);
     if (!settle())
       return false;

@@ -2,8 +2,8 @@
 // A solid of tetrahedra at rest under large strains: corotational or stable Neo-Hookean elements.
 //
 // The shape at rest is where a step of infinite length ends (integrator/solid_motion.h): a minimum
-// of elastic energy less the work of the load, sought downhill from the last shape. Pressures
-// follow the surface. Where the way to a load is lost, it is taken in parts, of a quarter
+// of elastic energy less the work of the load, sought from the last shape. Pressures follow the
+// surface. Where the way to a load is lost, it is taken in parts, of a quarter
 // each time. A shape counts where what is left is below 1e-6 of the displacement, and at most
 // a hundredth of the volume is inside out.
 //

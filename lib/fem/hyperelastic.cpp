@@ -2,6 +2,7 @@
 
 #include "base/cpu.h"
 #include "fem/hyperelastic_kernel_internal.h"
+#include "fem/hyperelastic_points_internal.h"
 #include "fem/matrix3_internal.h"
 #include "fem/modified_law_internal.h"
 #include "numeric/logarithm.h"
@@ -20,11 +21,6 @@ namespace {
 Eigen::Vector3d eigen(const Vec3& v) {
   return {v.x, v.y, v.z};
 }
-
-struct IntegrationPoint {
-  std::array<double, 4> at{}; ///< barycentric
-  double weight = 0;          ///< of a volume of 1
-};
 
 std::vector<IntegrationPoint> degree_6() {
   std::vector<IntegrationPoint> points;
@@ -48,9 +44,18 @@ std::vector<IntegrationPoint> degree_6() {
   return points;
 }
 
+} // namespace
+
+const std::vector<IntegrationPoint>& quadratic_points() {
+  static const std::vector<IntegrationPoint> all = degree_6();
+  return all;
+}
+
+namespace {
+
 std::span<const IntegrationPoint> points_of(bool quadratic) {
-  static const std::vector<IntegrationPoint> one{{{0.25, 0.25, 0.25, 0.25}, 1}}, many = degree_6();
-  return quadratic ? many : one;
+  static const std::vector<IntegrationPoint> one{{{0.25, 0.25, 0.25, 0.25}, 1}};
+  return quadratic ? quadratic_points() : one;
 }
 
 using Gradients = std::array<Vec3, HyperelasticResponse::nodes>;
@@ -133,6 +138,10 @@ SecondDerivative second_derivative(const Point& q, double d) {
 
 /// The same with eigenvalues of at least `least`.
 SecondDerivative positive(const SecondDerivative& m, double least) {
+  SecondDerivative shifted = m;
+  shifted.diagonal().array() -= least;
+  if (Eigen::LLT<SecondDerivative>(shifted).info() == Eigen::Success)
+    return m;
   const Eigen::SelfAdjointEigenSolver<SecondDerivative> solver(m);
   return solver.eigenvectors() * solver.eigenvalues().cwiseMax(least).asDiagonal() *
          solver.eigenvectors().transpose();
@@ -176,11 +185,22 @@ void add_tangent(const Point& q, const SecondDerivative& m, std::size_t count,
 
 } // namespace
 
+std::array<double, 4> projected_pressure(const SolidElement& element, bool quadratic,
+                                         const std::array<double, 4>& moment) {
+  // By the inverse of 1/20 (1 + δpq); of linear elements J itself.
+  std::array<double, 4> pressure{};
+  const double sum = moment[0] + moment[1] + moment[2] + moment[3];
+  for (std::size_t p = 0; p < 4; ++p)
+    pressure[p] = element.material.lambda * (quadratic ? 20 * (moment[p] - sum / 5) : sum);
+  return pressure;
+}
+
 void hyperelastic_response(const SolidElement& element, std::span<const Vec3> u, const Vec3& bubble,
-                           HyperelasticPart part, HyperelasticResponse& response) {
+                           HyperelasticPart part, HyperelasticResponse& response,
+                           const std::array<double, 4>* own) {
   const bool quadratic = u.size() == 10;
   const std::size_t count = quadratic ? 11 : 4;
-  const auto [lambda, mu] = element.material;
+  const double mu = element.material.mu;
   const std::span<const IntegrationPoint> at = points_of(quadratic);
   const HyperelasticLaw& law = element.law;
   const bool neo_hookean = is_neo_hookean(law), wants_second = part >= HyperelasticPart::tangent;
@@ -218,13 +238,9 @@ void hyperelastic_response(const SolidElement& element, std::span<const Vec3> u,
       moment[p] += at[n].weight * at[n].at[p] * (j - 1);
   }
 
-  // The projection of J - 1 by the inverse of 1/20 (1 + δpq); of linear elements J itself.
-  std::array<double, 4> pressure{};
-  const double sum = moment[0] + moment[1] + moment[2] + moment[3];
-  for (std::size_t p = 0; p < 4; ++p) {
-    pressure[p] = lambda * (quadratic ? 20 * (moment[p] - sum / 5) : sum);
-    response.energy += element.volume / 2 * pressure[p] * moment[p];
-  }
+  response.pressure = projected_pressure(element, quadratic, moment);
+  for (std::size_t p = 0; p < 4; ++p)
+    response.energy += element.volume / 2 * response.pressure[p] * moment[p];
   if (part == HyperelasticPart::energy)
     return;
 
@@ -234,7 +250,10 @@ void hyperelastic_response(const SolidElement& element, std::span<const Vec3> u,
   TangentSums sums;
   if (part == HyperelasticPart::tangent)
     sums = {};
-  std::array<Gradients, 4> slope{}; // of the moments by u
+  const std::array<double, 4>& pressure = own != nullptr ? *own : response.pressure;
+  std::array<Gradients, 4>& slope = response.volume_slope;
+  if (part != HyperelasticPart::force)
+    slope = {};
   for (std::size_t n = 0; n < at.size(); ++n) {
     const Point& q = points[n];
     double d = q.w.d;
@@ -270,24 +289,18 @@ void hyperelastic_response(const SolidElement& element, std::span<const Vec3> u,
         for (std::size_t b = a; b < count; ++b)
           response.tangent[33 * (3 * a + k / 3) + 3 * b + k % 3] = sums[k][a][b];
 
-  std::array<Gradients, 4> by_volume{};
-  for (std::size_t p = 0; p < 4; ++p)
-    for (std::size_t a = 0; a < count; ++a)
-      by_volume[p][a] = slope[p][a] * (lambda * element.volume);
-  for (std::size_t b = 0; b < count; ++b) {
-    Vec3 total;
-    for (std::size_t p = 0; p < 4; ++p)
-      total += slope[p][b];
-    std::array<Vec3, 4> of_pressure; // per displacement of b
-    for (std::size_t p = 0; p < 4; ++p)
-      of_pressure[p] = quadratic ? 20 * (slope[p][b] - total / 5) : total;
-    for (std::size_t a = 0; a <= b; ++a)
-      for (std::size_t i = 0; i < 3; ++i)
-        for (std::size_t j = 0; j < 3; ++j)
+  for (std::size_t b = 0; b < count; ++b)
+    for (std::size_t j = 0; j < 3; ++j) {
+      std::array<double, 4> moments{}; // per displacement of b along j
+      for (std::size_t p = 0; p < 4; ++p)
+        moments[p] = slope[p][b][static_cast<int>(j)];
+      const std::array<double, 4> of_pressure = projected_pressure(element, quadratic, moments);
+      for (std::size_t a = 0; a <= b; ++a)
+        for (std::size_t i = 0; i < 3; ++i)
           for (std::size_t p = 0; p < 4; ++p)
             response.tangent[33 * (3 * a + i) + 3 * b + j] +=
-                by_volume[p][a][static_cast<int>(i)] * of_pressure[p][static_cast<int>(j)];
-  }
+                element.volume * slope[p][a][static_cast<int>(i)] * of_pressure[p];
+    }
   for (std::size_t row = 0; row < 3 * count; ++row)
     for (std::size_t column = 0; column < row; ++column)
       if (row / 3 != column / 3)

@@ -59,6 +59,11 @@ struct HyperelasticResponse {
   /// -dforce/du: [33 (3 a + i) + 3 b + j] is what node a along i loses per displacement of b along
   /// j; symmetric. Linear elements fill the first 12 rows and columns.
   std::array<double, 9 * nodes * nodes> tangent{};
+  /// lambda times the projected J - 1 at the corners, Pa, by the displacements alone.
+  std::array<double, 4> pressure{};
+  /// With a tangent: the derivative by each node of the integral of J times each corner's
+  /// barycentric coordinate, over the volume of the element.
+  std::array<std::array<Vec3, nodes>, 4> volume_slope{};
 };
 
 /// What of it is wanted; each one costs what stands before it too.
@@ -75,9 +80,35 @@ enum class HyperelasticPart {
 /// Replaces what `response` had of the parts wanted, by the element's law. A classical Neo-Hookean
 /// element that is flat or inverted in one of its points has the energy HUGE_VAL, and nothing else
 /// of it is set; so has an element of any law whose energy is too large for a number.
+/// \param own  pressures at the corners as unknowns of their own: force and tangent are those under
+/// these, the tangent with the pressure that J makes added as ever; null: they are those of J
 /// \pre u.size() is 4 (the bubble isn't used then) or 10
 void hyperelastic_response(const SolidElement& element, std::span<const Vec3> u, const Vec3& bubble,
-                           HyperelasticPart part, HyperelasticResponse& response);
+                           HyperelasticPart part, HyperelasticResponse& response,
+                           const std::array<double, 4>* own = nullptr);
+
+/// lambda times the projection of a change of volume, whose moments with the corners' barycentric
+/// coordinates are given per volume.
+std::array<double, 4> projected_pressure(const SolidElement& element, bool quadratic,
+                                         const std::array<double, 4>& moment);
+
+/// Of one element without its tangent, as in HyperelasticResponse.
+struct HyperelasticForces {
+  double energy = 0;
+  std::array<Vec3, HyperelasticResponse::nodes> force{};
+  std::array<double, 4> pressure{};
+};
+
+/// Energies and forces of up to four elements; quadratic stable Neo-Hookean ones side by side. To
+/// rounding as hyperelastic_response() and settled_bubble().
+/// \param u  of `nodes` (4 or 10) nodes each
+/// \param bubbles  those of quadratic elements; without `own` from where they are sought, and
+/// become those that are found
+/// \param own  as in hyperelastic_response(), of each element, or empty
+void hyperelastic_forces(std::span<const SolidElement> elements, std::size_t nodes,
+                         std::span<const std::array<Vec3, 10>> u, std::span<Vec3> bubbles,
+                         std::span<const std::array<double, 4>> own,
+                         std::span<HyperelasticForces> forces);
 
 /// The bubble of least energy of a quadratic element, its nodes displaced by u, by Newton's method
 /// downhill from `start`, with a positive second derivative. J is affine in the bubble and a stable

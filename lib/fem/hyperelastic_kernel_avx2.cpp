@@ -6,4 +6,9 @@ void add_tangent_avx2(const TangentPoint& point, std::size_t count, TangentSums&
   add_tangent(point, count, sums);
 }
 
+void evaluate_group_avx2(const HyperelasticPoints& points, bool own, HyperelasticGroup& group,
+                         HyperelasticGroupResult& result) {
+  evaluate_group(points, own, group, result);
+}
+
 } // namespace gewebe

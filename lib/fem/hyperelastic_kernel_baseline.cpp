@@ -6,4 +6,9 @@ void add_tangent_baseline(const TangentPoint& point, std::size_t count, TangentS
   add_tangent(point, count, sums);
 }
 
+void evaluate_group_baseline(const HyperelasticPoints& points, bool own, HyperelasticGroup& group,
+                             HyperelasticGroupResult& result) {
+  evaluate_group(points, own, group, result);
+}
+
 } // namespace gewebe

@@ -1,6 +1,7 @@
 #pragma once
-// The inner loop of a hyperelastic tangent. Compiled once per CPU level; every level gives the same
-// bits: there is no fused multiplication, and each entry is summed in the order of the points.
+// The inner loops of hyperelastic elements: of a tangent, and forces of four elements at a time.
+// Compiled once per CPU level; every level gives the same bits: there is no fused multiplication,
+// and each entry is summed in the order of the points.
 
 #include <array>
 #include <cstddef>
@@ -25,5 +26,38 @@ using TangentSums = std::array<std::array<std::array<double, tangent_lanes>, tan
 using AddTangent = void (*)(const TangentPoint& point, std::size_t count, TangentSums& sums);
 void add_tangent_baseline(const TangentPoint& point, std::size_t count, TangentSums& sums);
 void add_tangent_avx2(const TangentPoint& point, std::size_t count, TangentSums& sums);
+
+/// The points of quadratic elements: barycentric coordinates, weights of a volume of 1, and what
+/// the bubble's gradient has of each corner's. Weights are equal in four classes of points.
+struct HyperelasticPoints {
+  static constexpr std::size_t count = 24, classes = 4;
+  static constexpr std::array<std::size_t, classes + 1> first{0, 4, 8, 12, 24};
+  double at[count][4], weight[count], bubble[count][4];
+};
+
+/// Four quadratic stable Neo-Hookean elements side by side.
+struct HyperelasticGroup {
+  double gradient[4][3][4]; ///< of the barycentric coordinates, 1/mm, by axis
+  double volume[4], mu[4], lambda[4];
+  double u[10][3][4], bubble[3][4];
+  double own[4][4]; ///< pressures, if they are unknowns
+};
+
+struct HyperelasticGroupResult {
+  double force[11][3][4];
+  double energy[4];     ///< less that of logarithms, over the volume
+  double product[4][4]; ///< of (I_1 + 1) / 4 in each class of points, whose logarithms these are
+  double pressure[4][4];
+  double left[4]; ///< of the bubble's energy when its last step was taken, over mu
+};
+
+/// \param own  pressures are the group's own, and its bubbles stay; else bubbles move to where they
+/// have least energy, and pressures are those of J
+using EvaluateGroup = void (*)(const HyperelasticPoints& points, bool own, HyperelasticGroup& group,
+                               HyperelasticGroupResult& result);
+void evaluate_group_baseline(const HyperelasticPoints& points, bool own, HyperelasticGroup& group,
+                             HyperelasticGroupResult& result);
+void evaluate_group_avx2(const HyperelasticPoints& points, bool own, HyperelasticGroup& group,
+                         HyperelasticGroupResult& result);
 
 } // namespace gewebe

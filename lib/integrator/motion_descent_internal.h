@@ -25,4 +25,16 @@ void descend_to_rest(const MotionObjective& objective, MotionPoint& now, MotionQ
                      MotionTangent& tangent, bool& exact, const SolidMotionOptions& options,
                      SolidStep& step, const Context& context);
 
+/// The same of hyperelastic elements alone, by Newton's method with bubbles and pressures as
+/// unknowns of their own (fem/mixed_solid.h), damped by the natural monotonicity test or downhill
+/// (Deuflhard, Newton methods for nonlinear problems, 2004, 3.3); each factor serves as long as
+/// rounds with it are cheaper than another one. Held axes move to `target` with the rest, and
+/// following forces are those of the shape.
+/// \param now  becomes the shape; its places alone are read and set
+/// \param exact  whether `tangent` was made
+void newton_to_rest(const MotionObjective& objective, MotionPoint& now, const Numbers& target,
+                    std::span<const FollowingForce> following, MotionQuick& quick,
+                    MotionTangent& tangent, bool& exact, const SolidMotionOptions& options,
+                    SolidStep& step, const Context& context);
+
 } // namespace gewebe

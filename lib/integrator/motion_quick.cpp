@@ -181,6 +181,11 @@ double MotionQuick::rounds_of_tangent(const MotionBody& body) const {
          (of_entry * static_cast<double>(factor_->entries()) + of_element * elements);
 }
 
+void MotionQuick::solve_at_rest(Numbers& v) const {
+  const Numbers f = v;
+  solve_axes(stiffness_, *factor_, f, v);
+}
+
 double MotionQuick::condition() const {
   // Of K, whose columns are those of its lower triangle mirrored.
   std::vector<double> sums(stiffness_.order());

@@ -76,6 +76,8 @@ public:
 
   /// How many rounds cost as much as a tangent of this body, by counts of operations. \pre prepared
   double rounds_of_tangent(const MotionBody& body) const;
+  /// Solves with the constant matrix at rest, in place and in the fixed frame. \pre prepared
+  void solve_at_rest(Numbers& v) const;
   /// Lower estimate of the condition of the constant matrix. \pre prepared
   double condition() const;
 

@@ -15,6 +15,7 @@
 #include <array>
 #include <cmath>
 #include <span>
+#include <utility>
 
 namespace gewebe {
 
@@ -141,11 +142,16 @@ void MotionTangent::make(const MotionObjective& objective, const Numbers& at, bo
           turned(static_cast<Eigen::Index>(n / 3), static_cast<Eigen::Index>(n % 3)) + block[n];
     return block;
   };
-  StiffnessMatrix tangent = assembled_matrix(body.mesh, block_of, objective.state().held, context);
+  StiffnessMatrix matrix = assembled_matrix(body.mesh, block_of, objective.state().held, context);
   if (!energy.springs().empty())
-    tangent = energy.springs().with_tangent(tangent, at, 1 / objective.step());
-  add_masses(body, objective.step(), tangent);
-  tangent_ = std::make_shared<const StiffnessMatrix>(std::move(tangent));
+    matrix = energy.springs().with_tangent(matrix, at, 1 / objective.step());
+  add_masses(body, objective.step(), matrix);
+  make(std::move(matrix), context);
+}
+
+void MotionTangent::make(StiffnessMatrix matrix, const Context& context) {
+  made_ = false;
+  tangent_ = std::make_shared<const StiffnessMatrix>(std::move(matrix));
   factorise(context);
   made_ = true;
   version_ = unique_number();

@@ -35,6 +35,8 @@ public:
   /// Its factor where the last evaluation was, at `at`: at rest that of the tangent itself, where
   /// it is positive definite, else of its positive parts. \throw as Factor: then it isn't made
   void make(const MotionObjective& objective, const Numbers& at, const Context& context);
+  /// Of a matrix made elsewhere. \throw as Factor: then it isn't made
+  void make(StiffnessMatrix matrix, const Context& context);
   /// Responses to unit forces along axes, columns of all axes. \pre made
   void unit_responses(std::span<const std::size_t> axes, std::span<double> columns) const;
   /// In place. \pre made

@@ -58,18 +58,25 @@ double SolidEnergy::hyperelastic(const Numbers& at, std::span<double> forces,
   std::vector<std::array<Vec3, 10>> part(body_.elements.size());
   const bool worth = body_.elements.size() >= (count == 10 ? worth_quadratic : worth_linear);
   const auto respond = [&](std::size_t begin, std::size_t end) {
-    HyperelasticResponse response;
-    for (std::size_t t = begin; t < end; ++t) {
-      const std::array<Vec3, 10> u = displacements(at, t);
-      Vec3 bubble;
-      if (count == 10)
-        bubble = new_bubbles_[t] =
-            settled_bubble(body_.elements[t], u, (at_rest_ ? new_bubbles_ : *bubbles_)[t]);
-      hyperelastic_response(body_.elements[t], std::span(u).first(count), bubble,
-                            HyperelasticPart::force, response);
-      energy[t] = response.energy;
-      for (std::size_t a = 0; a < count; ++a)
-        part[t][a] = response.force[a];
+    std::array<std::array<Vec3, 10>, 4> u;
+    std::array<HyperelasticForces, 4> of;
+    std::array<Vec3, 4> bubbles;
+    for (std::size_t t = begin; t < end; t += 4) {
+      const std::size_t together = std::min<std::size_t>(4, end - t);
+      for (std::size_t k = 0; k < together; ++k) {
+        u[k] = displacements(at, t + k);
+        if (count == 10)
+          bubbles[k] = (at_rest_ ? new_bubbles_ : *bubbles_)[t + k];
+      }
+      hyperelastic_forces(std::span(body_.elements).subspan(t, together), count, u, bubbles, {},
+                          of);
+      for (std::size_t k = 0; k < together; ++k) {
+        if (count == 10)
+          new_bubbles_[t + k] = bubbles[k];
+        energy[t + k] = of[k].energy;
+        for (std::size_t a = 0; a < count; ++a)
+          part[t + k][a] = of[k].force[a];
+      }
     }
   };
   parallel_blocks_if(worth, context, body_.elements.size(), 64, respond);

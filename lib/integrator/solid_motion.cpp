@@ -65,6 +65,7 @@ struct SolidMotion::State {
   double last_step = 0;
   Numbers target; ///< of held axes in the next step: displacements
   bool moved = false;
+  std::vector<FollowingForce> following;
   Numbers reactions;
   MotionQuick quick;
   MotionTangent tangent;
@@ -316,6 +317,16 @@ MotionPoint SolidMotion::State::search_rest(const MotionObjective& objective, So
                                             const Context& context) {
   MotionPoint found;
   found.at = now.place;
+  if (energy.law() == SolidLaw::hyperelastic && energy.springs().empty() &&
+      energy.volumes().empty()) {
+    Numbers ahead = now.place;
+    for (std::size_t axis = 0; axis < body.axes(); ++axis)
+      if (now.held[axis] != 0 && moved)
+        ahead[axis] = body.rest[axis] + target[axis];
+    newton_to_rest(objective, found, ahead, following, quick, tangent, open->exact, options, step,
+                   context);
+    return found;
+  }
   energy.note_frames();
   if (moves_held_from(now.place)) {
     foresee_held(now.place, found, context);
@@ -446,6 +457,10 @@ SolidStep SolidMotion::step(double h, const Context& context) {
   s.last_step = h;
   s.moved = false;
   return step;
+}
+
+void SolidMotion::follow(std::vector<FollowingForce> forces) {
+  state_->following = std::move(forces);
 }
 
 SolidStep SolidMotion::settle(const Context& context) {

@@ -34,9 +34,11 @@
 // may stay wound up, in a minimum of their own with every element right side out: 255 of the first,
 // a quarter of quadratic ones.
 //
-// A step of infinite length is statics: the same minimum without inertia and damping. Rounds of the
-// constant matrix are few where strains are small. Elsewhere, and where the material is all but
-// incompressible, tangents serve, each for several rounds with secants on top.
+// A step of infinite length is statics: the same minimum without inertia and damping. Hyperelastic
+// elements get there by Newton's method with pressures as unknowns (fem/mixed_solid.h): near
+// nu = 1/2 rounds on displacements alone are cut to an eighth, because volumes change to second
+// order. Other elements, and steps in parts, by rounds of the constant matrix while they are few,
+// then by tangents, each for several rounds with secants on top.
 //
 // Springs may move along with the elements: those of nets that are tied to a solid, and the ties.
 // The constant matrix has their stiffness along every axis, which bounds them however they turn: of
@@ -49,7 +51,6 @@
 
 #include "base/context.h"
 #include "fem/assembly.h"
-#include "fem/hyperelastic.h"
 #include "tetrahedra/tet_mesh.h"
 
 #include <array>
@@ -94,6 +95,14 @@ struct SolidNet {
   /// modulus of what fills them, Pa; none: there is no such surface.
   std::span<const Triangle> enclosing{};
   double bulk = 0;
+};
+
+/// A force that follows nodes: factor (b - a) x (c - a) of the places of a triangle, as of a
+/// pressure of 6 times the factor that acts on a third of it.
+struct FollowingForce {
+  std::uint32_t node = 0; ///< that it acts on, of the triangle
+  Triangle triangle{};
+  double factor = 0; ///< Pa
 };
 
 /// What is said of how a solid moves; SolidMotionOptions has the rest.
@@ -145,6 +154,9 @@ public:
   /// the 3 n axes, read where they are held.
   void move_held(std::span<const double> displacement);
 
+  /// Forces beside the load in settle() from now on. \pre the law is hyperelastic, or there are
+  /// none
+  void follow(std::vector<FollowingForce> forces);
   /// To rest under the load, held axes where they are moved to: the step of infinite length, which
   /// has no inertia and no damping, downhill from here. It ends where what is left is within the
   /// tolerance, of the displacement from rest, or `left` says more. It doesn't depend on steps
