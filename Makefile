@@ -226,7 +226,17 @@ define compile
 $(CCACHE) $(CXX) $(ALLFLAGS) $(FILE_FLAGS) $(precompiled) $(if $(filter $(BUILD)/unity/% $(UNIT_BUILD)/unity/%,$<),$(UNITY_FLAGS)) -MMD -MP -c $< -o $@
 endef
 
-$(ARCHIVE): $(call obj,$(LIB_SRC))
+# The viewer of pages, as strings of C++.
+VIEWER := $(BUILD)/obj/viewer.o
+$(BUILD)/viewer.cpp: formats/page/viewer.html formats/page/viewer.js Makefile
+	@mkdir -p $(@D)
+	@{ for kind in html js; do printf 'extern "C" const char gewebe_viewer_%s[] = R"viewer(' $$kind && cat formats/page/viewer.$$kind && \
+	  printf ')viewer";\n' || exit 1; done; } > $@
+$(VIEWER): $(BUILD)/viewer.cpp | $(FIRST)
+	@mkdir -p $(@D)
+	$(CXX) -fPIC -c $< -o $@
+
+$(ARCHIVE): $(call obj,$(LIB_SRC)) $(VIEWER)
 $(SHARED): $(call obj,$(SHARED_SRC))
 $(ARCHIVE) $(SHARED):
 	@mkdir -p $(@D) && rm -f $@

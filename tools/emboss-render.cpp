@@ -1,12 +1,15 @@
-// emboss-render: mesh, tetrahedra, model, result or volume -> picture.
+// emboss-render: mesh, tetrahedra, model, result or volume -> picture, page or glTF.
 
 #include "base/digest.h"
+#include "formats/image/film.h"
 #include "formats/image/image_file.h"
 #include "shading/occlusion.h"
 #include "tools/cli/cli.h"
+#include "tools/render/picture_sink.h"
 #include "tools/render/render_arguments.h"
 #include "tools/render/render_field.h"
 #include "tools/render/render_materials.h"
+#include "tools/render/render_page.h"
 #include "tools/render/render_pictures.h"
 #include "tools/render/render_volume.h"
 #include "tools/render/solid_surface.h"
@@ -37,97 +40,81 @@ std::vector<Surface> read(cli::Run& run, Input& input, const SurfaceReadOptions&
   return surfaces;
 }
 
-/// PATTERN with its "%d" or "%04d" replaced; "%%" is one "%".
-std::string numbered(const std::string& pattern, std::int64_t n) {
-  std::string name;
-  bool used = false;
-  for (std::size_t at = 0; at < pattern.size(); ++at) {
-    if (pattern[at] != '%') {
-      name += pattern[at];
-      continue;
-    }
-    const std::size_t end = pattern.find_first_not_of("0123456789", at + 1);
-    if (end != std::string::npos && pattern[end] == 'd' && end - at <= 3 && !used) {
-      const std::string digits = std::to_string(n);
-      const std::size_t width =
-          end == at + 1 ? 0 : std::stoul(pattern.substr(at + 1, end - at - 1));
-      name += std::string(width > digits.size() ? width - digits.size() : 0, '0') + digits;
-      used = true;
-    } else if (end == at + 1 && pattern[end] == '%') {
-      name += '%';
-    } else {
-      throw UsageError("-o: '" + pattern +
-                       "', expected one %d or %04d for the number of the frame");
-    }
-    at = end;
-  }
-  return name;
+bool contains(const std::vector<Kind>& kinds, Kind kind) {
+  return std::ranges::find(kinds, kind) != kinds.end();
 }
 
-void work(cli::Run& run, cli::RenderArguments a) {
-  const Kind to = output_kind(run.to(), run.output(), Kind::png, picture_kinds());
-  const bool sequence = !a.frames.empty() || a.turn || a.turn_light;
-  const bool many = sequence && run.output().find('%') != std::string::npos;
-  std::optional<Output> one;
-  if (!many)
-    one.emplace(run.output(), run.output_options(true));
-  Input input(a.surface);
-  SurfaceReadOptions& reading = a.reading;
-  reading.kind = input_kind(input.peek(4096), a.surface, run.format());
-  check_kind(a, input, reading.kind);
-  cli::take_instruments(a, input);
-  if (reading.kind == Kind::vdb) {
-    const Image picture = cli::volume_picture(run, a, input);
-    run.timed("write", [&] { write_image(*one, picture, to); });
-    one->commit();
-    return run.stats().set("digest", image_digest(picture));
+/// Kinds of pictures, films and scenes.
+std::vector<Kind> output_kinds() {
+  std::vector<Kind> kinds = picture_kinds();
+  kinds.insert(kinds.end(), film_kinds().begin(), film_kinds().end());
+  kinds.insert(kinds.end(), cli::scene_kinds().begin(), cli::scene_kinds().end());
+  return kinds;
+}
+
+/// The frames to draw: of a result, or one shape from all sides.
+std::vector<std::int64_t> drawn_frames(const cli::RenderArguments& a, const Input& input) {
+  if (!a.frames.empty()) {
+    if (a.reading.kind != Kind::hdf5)
+      throw UsageError(input.name(), "--frames for no result of a run, expected --frames absent");
+    return result_frames(input, a.frames);
   }
   std::vector<std::int64_t> frames;
-  if (!a.frames.empty()) {
-    if (reading.kind != Kind::hdf5)
-      throw UsageError(input.name(), "--frames for no result of a run, expected --frames absent");
-    frames = result_frames(input, a.frames);
-  } else { // one shape from all sides
-    const std::int64_t count = std::max(a.turn.value_or(1), a.turn_light.value_or(1));
-    for (std::int64_t n = 0; n < count; ++n)
-      frames.push_back(n);
-  }
-  if (reading.kind == Kind::hdf5)
-    take_field(run, a, input, a.frames.empty() ? std::vector{reading.frame.value_or(-1)} : frames);
-  if (frames.size() > 1 && !many && run.output() != "-" && to == Kind::png)
-    throw UsageError(run.output() + ": " + std::to_string(frames.size()) +
-                     " pictures for one file, expected %d or %04d in its name, --to rgb, or "
-                     "-o - for a stream");
+  const std::int64_t count = std::max(a.turn.value_or(1), a.turn_light.value_or(1));
+  for (std::int64_t n = 0; n < count; ++n)
+    frames.push_back(n);
+  return frames;
+}
+
+void draw(cli::Run& run, cli::RenderArguments& a, Input& input, cli::PictureSink& sink) {
+  const std::vector<std::int64_t> frames = drawn_frames(a, input);
+  if (a.reading.kind == Kind::hdf5)
+    take_field(run, a, input,
+               a.frames.empty() ? std::vector{a.reading.frame.value_or(-1)} : frames);
+  sink.expect(frames.size());
   cli::Pictures pictures(run, a);
   Digest digest;
   Image picture;
   std::vector<Surface> surfaces;
-  std::string bytes;
   for (const std::int64_t frame : frames) {
     if (!a.frames.empty())
-      reading.frame = frame;
+      a.reading.frame = frame;
     if (!a.frames.empty() || surfaces.empty())
       surfaces =
-          run.timed("read", [&] { return read(run, input, reading, a.drawing.occlusion > 0); });
+          run.timed("read", [&] { return read(run, input, a.reading, a.drawing.occlusion > 0); });
     picture = pictures.of(surfaces);
     digest.add(picture.values);
-    run.timed("write", [&] {
-      if (to != Kind::rgb && !pictures.kept())
-        bytes = image_bytes(picture, to);
-      const auto put = [&](Output& output) {
-        return to == Kind::rgb ? write_image(output, picture, to) : output.write(bytes);
-      };
-      if (!many)
-        return put(*one);
-      Output output(numbered(run.output(), frame), run.output_options(true));
-      put(output);
-      output.commit();
-    });
+    run.timed("write", [&] { sink.put(picture, pictures.kept(), frame); });
   }
-  if (one)
-    one->commit();
+  run.timed("write", [&] { sink.commit(); });
   pictures.tell(run.stats(), picture);
   run.stats().set("digest", digest.hex());
+}
+
+void work(cli::Run& run, cli::RenderArguments a) {
+  const Kind to = output_kind(run.to(), run.output(), Kind::png, output_kinds());
+  const bool film = contains(film_kinds(), to), scene = contains(cli::scene_kinds(), to);
+  if (a.rate && !film)
+    throw UsageError("--fps for " + std::string(kind_name(to)) + ", expected mp4 or webm");
+  const bool sequence = !a.frames.empty() || a.turn || a.turn_light;
+  const bool many = sequence && !film && run.output().find('%') != std::string::npos;
+  std::optional<cli::PictureSink> sink;
+  if (!scene)
+    sink.emplace(run, to, many, a.rate.value_or(25));
+  Input input(a.surface);
+  a.reading.kind = input_kind(input.peek(4096), a.surface, run.format());
+  check_kind(a, input, a.reading.kind);
+  cli::take_instruments(a, input);
+  if (scene)
+    return cli::write_scene(run, a, input, to);
+  if (a.reading.kind != Kind::vdb)
+    return draw(run, a, input, *sink);
+  const Image picture = cli::volume_picture(run, a, input);
+  run.timed("write", [&] {
+    sink->put(picture, false, 0);
+    sink->commit();
+  });
+  run.stats().set("digest", image_digest(picture));
 }
 
 } // namespace
@@ -141,7 +128,7 @@ int main(int argc, char** argv) {
       "Draws a mesh, tetrahedra, a model or a result with embossed textures, or a volume.");
   cli::RenderArguments a;
   declare(p, a);
-  p.output_kinds(picture_kinds());
+  p.output_kinds(output_kinds());
   std::vector<Kind> kinds = readable_surface_kinds();
   kinds.push_back(Kind::vdb);
   p.input_kinds(kinds);

@@ -2,6 +2,7 @@
 
 #include "formats/mesh/mesh_file.h"
 #include "formats/model/ela.h"
+#include "formats/model/solid_deck.h"
 #include "formats/tetrahedra/tet_file.h"
 #include "model/build.h"
 #include "model/figures.h"
@@ -25,6 +26,13 @@ namespace {
 
 std::vector<Kind> and_ela(std::vector<Kind> kinds) {
   kinds.push_back(Kind::ela);
+  return kinds;
+}
+
+/// Meshes, models, and solids for other solvers.
+std::vector<Kind> all_outputs() {
+  std::vector<Kind> kinds = and_ela(writable_mesh_kinds());
+  kinds.insert(kinds.end(), solid_deck_kinds().begin(), solid_deck_kinds().end());
   return kinds;
 }
 
@@ -60,7 +68,7 @@ void report_steps(cli::Run& run, const Model& model) {
 void work(cli::Run& run, ModelArguments& a) {
   if (!a.materials.empty())
     choose_materials(a);
-  const Kind to = output_kind(run.to(), run.output(), Kind::ela, and_ela(writable_mesh_kinds()));
+  const Kind to = output_kind(run.to(), run.output(), Kind::ela, all_outputs());
   Output output(run.output(), run.output_options(is_binary(to)));
   Space space = Space::unknown;
   Model model = cli::model_source(run, a, space);
@@ -70,7 +78,8 @@ void work(cli::Run& run, ModelArguments& a) {
     fix(model, a);
   if (!a.fit.empty())
     cli::fit_model(run, model, a.fit);
-  if (to == Kind::ela) {
+  const bool deck = std::ranges::find(solid_deck_kinds(), to) != solid_deck_kinds().end();
+  if (to == Kind::ela || deck) {
     cli::warn_of_hinges(run, model);
     cli::warn_of_laws(run, model);
   }
@@ -78,6 +87,8 @@ void work(cli::Run& run, ModelArguments& a) {
   run.timed("write", [&] {
     if (to == Kind::ela)
       write_ela(output, model, run.context(), space);
+    else if (deck)
+      write_solid_deck(output, model, to);
     else
       write_mesh(output, surface_mesh(model), to);
   });
@@ -100,7 +111,7 @@ int main(int argc, char** argv) {
   declare(p, a);
   declare_space(p, a.space);
   declare_transform(p, a.transform);
-  p.output_kinds(and_ela(writable_mesh_kinds()));
+  p.output_kinds(all_outputs());
   p.input_kinds(all_inputs());
   p.operand("MESH", a.mesh, "mesh, tetrahedra or model");
   p.check([&] { complete(a); });

@@ -4,6 +4,7 @@
 #include "formats/mesh/assimp_child.h"
 #include "formats/mesh/obj_stl.h"
 #include "formats/mesh/ply.h"
+#include "formats/mesh/vtk_legacy.h"
 #include "formats/mesh/vtp.h"
 
 #include <algorithm>
@@ -21,7 +22,8 @@ double stated_unit(Kind kind, std::string_view bytes) {
 }
 
 bool has_tetrahedra(Kind kind) {
-  return kind == Kind::vtu || kind == Kind::msh || kind == Kind::medit || kind == Kind::tetgen;
+  return kind == Kind::vtu || kind == Kind::msh || kind == Kind::medit || kind == Kind::tetgen ||
+         kind == Kind::inp;
 }
 
 std::string list(const std::vector<std::string>& words) {
@@ -68,9 +70,10 @@ TriangleMesh read_unwelded(const std::string& bytes, const Input& input,
     stats.skipped_properties = counts.skipped_properties;
     return mesh;
   }
-  if (options.kind == Kind::vtp) {
+  if (options.kind == Kind::vtp || options.kind == Kind::vtk) {
     VtpStats counts;
-    TriangleMesh mesh = read_vtp(bytes, input.name(), &counts);
+    TriangleMesh mesh = options.kind == Kind::vtp ? read_vtp(bytes, input.name(), &counts)
+                                                  : read_vtk_surface(bytes, input.name(), &counts);
     if (mesh.triangles.empty())
       throw Error("no polygon, expected one");
     stats.polygons = counts.polygons;
@@ -102,8 +105,9 @@ std::uint64_t count_parts(const TriangleMesh& mesh) {
 } // namespace
 
 const std::vector<Kind>& readable_mesh_kinds() {
-  static const std::vector<Kind> kinds{Kind::ply,  Kind::obj, Kind::stl,      Kind::off, Kind::dxf,
-                                       Kind::gltf, Kind::glb, Kind::three_ds, Kind::dae, Kind::vtp};
+  static const std::vector<Kind> kinds{Kind::ply, Kind::obj,  Kind::stl, Kind::off,
+                                       Kind::dxf, Kind::gltf, Kind::glb, Kind::three_ds,
+                                       Kind::dae, Kind::vtp,  Kind::vtk};
   return kinds;
 }
 

@@ -14,7 +14,7 @@
 
 namespace gewebe {
 
-/// ply, obj, stl, off, dxf, gltf, glb, 3ds, dae, vtp.
+/// ply, obj, stl, off, dxf, gltf, glb, 3ds, dae, vtp, vtk.
 const std::vector<Kind>& readable_mesh_kinds();
 /// ply, obj, stl, glb, 3ds, dae.
 const std::vector<Kind>& writable_mesh_kinds();

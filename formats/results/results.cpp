@@ -75,6 +75,15 @@ hdf5::Group object_group(const std::string& path, const hdf5::Group& objects,
                         (list.empty() ? "one, but there is none" : "one of " + list));
 }
 
+/// How many of the nodes are on the surface.
+std::uint64_t surface_nodes(const hdf5::Group& group, std::uint64_t nodes) {
+  const auto count = group.number<std::uint64_t>("surface_nodes");
+  if (count > nodes)
+    group.fail("has " + std::to_string(count) + " nodes on the surface, expected at most " +
+               std::to_string(nodes));
+  return count;
+}
+
 /// The first `count` points of a shape in a frame, or all; at rest, and displaced.
 struct FramePoints {
   std::vector<Vec3> rest, moved;
@@ -84,11 +93,7 @@ FramePoints read_points(const std::string& path, const ShapeGroup& shape, std::s
                         bool surface) {
   const hdf5::Group& group = shape.group;
   const hdf5::Dataset points = group.dataset("points", hdf5::Number::float64);
-  const std::uint64_t n = rows_of_three(points);
-  const auto of_surface = group.number<std::uint64_t>("surface_nodes");
-  if (of_surface > n)
-    group.fail("has " + std::to_string(of_surface) + " nodes on the surface, expected at most " +
-               std::to_string(n));
+  const std::uint64_t n = rows_of_three(points), of_surface = surface_nodes(group, n);
   const hdf5::Dataset displacement = group.dataset("displacement", hdf5::Number::float32);
   displacement.require_shape({displacement.rows(), n, 3});
   if (frame - shape.first >= displacement.rows())
@@ -137,17 +142,14 @@ void read_triangles(const hdf5::Group& group, TriangleMesh& mesh) {
     mesh.material = group.read<std::int32_t>("material", count);
 }
 
-/// The skin of a shape in a frame, from the displacements of its nodes.
-void read_skin(const hdf5::Group& group, const FramePoints& nodes, ResultSurface& result) {
-  const hdf5::Dataset points = group.dataset("points", hdf5::Number::float64);
-  const std::uint64_t count = rows_of_three(points);
+/// How a skin follows the nodes of a shape.
+SkinWeights read_skin_weights(const hdf5::Group& group, std::size_t nodes) {
+  const std::uint64_t count = rows_of_three(group.dataset("points", hdf5::Number::float64));
   const hdf5::Dataset followed = group.dataset("nodes", hdf5::Number::uint32),
                       weights = group.dataset("weights", hdf5::Number::float64);
   const std::uint64_t each = followed.shape().size() == 2 ? followed.shape()[1] : 0;
   followed.require_shape({count, each});
   weights.require_shape({count, each});
-  std::vector<double> rest(3 * count);
-  points.read_rows(0, std::span<double>(rest));
   SkinWeights skin;
   skin.nodes = each;
   skin.node.resize(each * count);
@@ -155,9 +157,19 @@ void read_skin(const hdf5::Group& group, const FramePoints& nodes, ResultSurface
   skin.weight.resize(each * count);
   weights.read_rows(0, std::span<double>(skin.weight));
   for (const std::uint32_t node : skin.node)
-    if (node >= nodes.rest.size())
+    if (node >= nodes)
       followed.fail("names node " + std::to_string(node) + ", expected 0 to " +
-                    std::to_string(nodes.rest.size() - 1));
+                    std::to_string(nodes - 1));
+  return skin;
+}
+
+/// The skin of a shape in a frame, from the displacements of its nodes.
+void read_skin(const hdf5::Group& group, const FramePoints& nodes, ResultSurface& result) {
+  const SkinWeights skin = read_skin_weights(group, nodes.rest.size());
+  const hdf5::Dataset points = group.dataset("points", hdf5::Number::float64);
+  const std::uint64_t count = points.rows();
+  std::vector<double> rest(3 * count);
+  points.read_rows(0, std::span<double>(rest));
   std::vector<double> displacement;
   displacement.reserve(3 * nodes.rest.size());
   for (std::size_t i = 0; i < nodes.rest.size(); ++i) {
@@ -187,6 +199,14 @@ std::vector<double> read_von_mises(const std::string& path, const ShapeGroup& sh
   std::vector<float> values(n);
   set.read_rows(frame - first, std::span<float>(values));
   return {values.begin(), values.end()};
+}
+
+void require_finite(const std::string& path, const std::string& object, const std::string& field,
+                    const std::vector<double>& values) {
+  for (std::size_t i = 0; i < values.size(); ++i)
+    if (!std::isfinite(values[i]))
+      throw Error(path, "the " + field + " of node " + std::to_string(i) + " of object '" + object +
+                            "' is not finite");
 }
 
 /// A row of `count` numbers. \throw Error if there is none, or one is larger than any scene has
@@ -377,6 +397,37 @@ ResultSolid read_result_solid(const std::string& path, const std::string& object
   return result;
 }
 
+std::vector<double> read_result_surface_stress(const std::string& path, const std::string& object,
+                                               std::size_t frame) {
+  const hdf5::File file = open_checked(path);
+  const hdf5::Group objects = file.root().group("objects");
+  (void)object_group(path, objects, object);
+  const std::optional<ShapeGroup> shape = shape_in_frame(objects, object, frame);
+  if (!shape || !shape->group.has("fields") ||
+      frame < shape->group.group("fields").number<std::uint64_t>("first_frame"))
+    return {};
+  std::vector<double> nodes = read_von_mises(path, *shape, object, frame);
+  require_finite(path, object, "von-mises", nodes);
+  if (!shape->group.has("skin")) {
+    nodes.resize(surface_nodes(shape->group, nodes.size()));
+    return nodes;
+  }
+  const SkinWeights skin = read_skin_weights(shape->group.group("skin"), nodes.size());
+  std::vector<double> values;
+  for (std::size_t first = 0; first < skin.node.size(); first += skin.nodes) {
+    // Outside the element the weights extrapolate; stresses stay between those of its nodes.
+    double value = 0, least = nodes[skin.node[first]], greatest = least;
+    for (std::size_t k = first; k < first + skin.nodes; ++k) {
+      const double node = nodes[skin.node[k]];
+      value += skin.weight[k] * node;
+      least = node < least ? node : least;
+      greatest = node > greatest ? node : greatest;
+    }
+    values.push_back(value > greatest ? greatest : value >= least ? value : least);
+  }
+  return values;
+}
+
 const std::vector<std::string>& result_field_names() {
   static const std::vector<std::string> names{"displacement", "von-mises"};
   return names;
@@ -393,10 +444,7 @@ std::vector<double> read_result_values(const std::string& path, const std::strin
   std::vector<double> values = field == "von-mises"
                                    ? read_von_mises(path, *shape, object, frame)
                                    : read_points(path, *shape, frame, false).lengths;
-  for (std::size_t i = 0; i < values.size(); ++i)
-    if (!std::isfinite(values[i]))
-      throw Error(path, "the " + field + " of node " + std::to_string(i) + " of object '" + object +
-                            "' is not finite");
+  require_finite(path, object, field, values);
   return values;
 }
 

@@ -66,6 +66,12 @@ struct ResultInstrument {
 /// pose no rotation or a mesh without its surface
 std::vector<ResultInstrument> read_result_instruments(const std::string& path, std::size_t frame);
 
+/// The von Mises stress (Pa) at each point of read_result_surface() in one frame, at those of a
+/// skin interpolated; none where the object is not there yet or has no stress then. \throw Error as
+/// read_result_surface; if a value is not finite
+std::vector<double> read_result_surface_stress(const std::string& path, const std::string& object,
+                                               std::size_t frame);
+
 /// The fields of a result: "displacement", its length in mm; "von-mises", the equivalent stress of
 /// the mean tensor at a node in Pa, where the scene emitted stress.
 const std::vector<std::string>& result_field_names();

@@ -10,7 +10,7 @@
 namespace gewebe {
 namespace {
 
-constexpr std::array<std::pair<Kind, std::string_view>, 24> names{{
+constexpr std::array<std::pair<Kind, std::string_view>, 32> names{{
     {Kind::particles, "particles"},
     {Kind::vdb, "vdb"},
     {Kind::ply, "ply"},
@@ -35,6 +35,14 @@ constexpr std::array<std::pair<Kind, std::string_view>, 24> names{{
     {Kind::ppm, "ppm"},
     {Kind::csv, "csv"},
     {Kind::vtkhdf, "vtkhdf"},
+    {Kind::html, "html"},
+    {Kind::nrrd, "nrrd"},
+    {Kind::mha, "mha"},
+    {Kind::vtk, "vtk"},
+    {Kind::inp, "inp"},
+    {Kind::feb, "feb"},
+    {Kind::mp4, "mp4"},
+    {Kind::webm, "webm"},
 }};
 
 /// The suffix of a path that names a kind, though none of ours: up to five letters and digits, not
@@ -161,6 +169,8 @@ Kind kind_from_magic(std::string_view bytes) {
     return Kind::nifti;
   if (bytes.starts_with("$MeshFormat") || bytes.starts_with("$Comments"))
     return Kind::msh;
+  if (bytes.starts_with("# vtk DataFile Version"))
+    return Kind::vtk;
   if (const std::size_t at = bytes.find("<VTKFile");
       at != std::string_view::npos && first_word(bytes).starts_with('<'))
     if (const Kind kind = vtk_kind(bytes.substr(at)); kind != Kind::unknown)
@@ -205,7 +215,8 @@ Kind output_kind(std::string_view to, std::string_view path, Kind fallback,
 bool is_binary(Kind kind) {
   return kind != Kind::particles && kind != Kind::ela && kind != Kind::obj && kind != Kind::off &&
          kind != Kind::dxf && kind != Kind::gltf && kind != Kind::dae && kind != Kind::csv &&
-         kind != Kind::msh && kind != Kind::medit && kind != Kind::tetgen;
+         kind != Kind::msh && kind != Kind::medit && kind != Kind::tetgen && kind != Kind::html &&
+         kind != Kind::inp && kind != Kind::feb;
 }
 
 } // namespace gewebe

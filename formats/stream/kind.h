@@ -34,6 +34,14 @@ enum class Kind {
   rgb,
   csv,
   vtkhdf, ///< VTK's unstructured grids over time, in HDF5
+  html,   ///< a page with its viewer
+  nrrd,
+  mha,
+  vtk, ///< VTK's legacy files
+  inp, ///< Abaqus
+  feb, ///< FEBio
+  mp4,
+  webm,
 };
 
 /// The name of `--format` and `--to`: "vdb", "3ds", …
@@ -44,8 +52,8 @@ std::string kind_list(const std::vector<Kind>& kinds);
 Kind kind_from_name(std::string_view name);
 /// The kind that a file name's suffix stands for, or unknown. Case does not matter.
 Kind kind_from_suffix(std::string_view path);
-/// The kind that the first bytes prove (PLY, VDB, HDF5, NIfTI, GLB, PNG, VTU, VTP, Gmsh; `ela_expl`
-/// and Medit's word after blank lines and comments), or unknown.
+/// The kind that the first bytes prove (PLY, VDB, HDF5, NIfTI, GLB, PNG, VTK, VTU, VTP, Gmsh;
+/// `ela_expl` and Medit's word after blank lines and comments), or unknown.
 Kind kind_from_magic(std::string_view first_bytes);
 /// Magic, else the name given by --format (may be empty), else the suffix. `peeked` are the first
 /// 4096 bytes. \throw UsageError if `format` names no kind

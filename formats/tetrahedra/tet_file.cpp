@@ -1,6 +1,7 @@
 #include "formats/tetrahedra/tet_file.h"
 
 #include "formats/mesh/mesh_file.h"
+#include "formats/mesh/vtk_legacy.h"
 #include "formats/tetrahedra/tet_file_internal.h"
 #include "tetrahedra/check.h"
 
@@ -78,6 +79,10 @@ void write_to(const TetMesh& mesh, Kind kind, const Sink& sink) {
     tet::write_msh4(mesh, sink);
   else if (kind == Kind::medit)
     tet::write_medit(mesh, sink);
+  else if (kind == Kind::vtk)
+    tet::write_vtk(mesh, sink);
+  else if (kind == Kind::inp)
+    tet::write_inp(mesh, sink);
   else
     throw UsageError(std::string(kind_name(kind)) + " is not written, expected one of " +
                      kind_list(writable_tet_kinds()));
@@ -86,17 +91,20 @@ void write_to(const TetMesh& mesh, Kind kind, const Sink& sink) {
 } // namespace
 
 const std::vector<Kind>& readable_tet_kinds() {
-  static const std::vector<Kind> kinds{Kind::ply, Kind::vtu, Kind::msh, Kind::medit, Kind::tetgen};
+  static const std::vector<Kind> kinds{Kind::ply,    Kind::vtu, Kind::msh, Kind::medit,
+                                       Kind::tetgen, Kind::vtk, Kind::inp};
   return kinds;
 }
 
 const std::vector<Kind>& writable_tet_kinds() {
-  static const std::vector<Kind> kinds{Kind::ply,  Kind::vtu,   Kind::msh,
-                                       Kind::msh4, Kind::medit, Kind::tetgen};
+  static const std::vector<Kind> kinds{Kind::ply,   Kind::vtu,    Kind::msh, Kind::msh4,
+                                       Kind::medit, Kind::tetgen, Kind::vtk, Kind::inp};
   return kinds;
 }
 
 bool holds_tetrahedra(std::string_view peeked, Kind kind) {
+  if (kind == Kind::vtk)
+    return vtk::is_legacy_grid(peeked);
   if (kind != Kind::ply)
     return kind == Kind::msh4 || contains(readable_tet_kinds(), kind);
   const std::string_view header = peeked.substr(0, peeked.find("\nend_header"));
@@ -117,6 +125,10 @@ TetMesh tet_mesh_from_bytes(std::string_view bytes, const std::string& name, Kin
       mesh = tet::read_msh(bytes, name, counts);
     else if (kind == Kind::medit)
       mesh = tet::read_medit(bytes, name, counts);
+    else if (kind == Kind::vtk)
+      mesh = tet::read_vtk(bytes, name, counts);
+    else if (kind == Kind::inp)
+      mesh = tet::read_inp(bytes, name, counts);
     else
       throw Error((kind == Kind::unknown ? std::string("the format is not known")
                                          : std::string(kind_name(kind)) + " has no tetrahedra") +

@@ -13,13 +13,14 @@
 
 namespace gewebe {
 
-/// ply, vtu, msh, medit, tetgen.
+/// ply, vtu, msh, medit, tetgen, vtk, inp.
 const std::vector<Kind>& readable_tet_kinds();
-/// ply, vtu, msh (2.2 in text), msh4 (4.1, binary), medit, tetgen.
+/// ply, vtu, msh (2.2 in text), msh4 (4.1, binary), medit, tetgen, vtk (legacy, binary), inp.
 const std::vector<Kind>& writable_tet_kinds();
 
 /// Whether an input of this kind, whose first bytes (up to 4096) are `peeked`, is a tetrahedral
-/// mesh: all kinds above are, of PLY those whose header names the element `tetrahedron`.
+/// mesh: all kinds above are, of PLY those whose header names the element `tetrahedron`, of legacy
+/// VTK unstructured grids.
 bool holds_tetrahedra(std::string_view peeked, Kind kind);
 
 struct TetReadOptions {
@@ -45,11 +46,12 @@ struct TetReadStats {
 TetMesh read_tet_mesh(Input& input, const TetReadOptions& options, TetReadStats* stats = nullptr);
 
 /// Writes the mesh, given in mm, as `kind`; the caller commits. Reading it gives the same mesh bit
-/// for bit, except a material that is 0 everywhere, for which Medit has no other word than none.
-/// TetGen's other file goes beside the output's, with the options `beside`, and is committed here
-/// once both are whole, so that only a rename that fails leaves one without the other.
-/// \pre check_mesh(mesh) passes   \throw Error with place: TetGen on a pipe, too many points for
-/// the format; UsageError if the kind is not writable
+/// for bit, except a material that is 0 everywhere, for which Medit has no other word than none,
+/// and coordinates of more than 20 characters in inp, which are rounded to 20. TetGen's other file
+/// goes beside the output's, with the options `beside`, and is committed here once both are whole,
+/// so that only a rename that fails leaves one without the other. \pre check_mesh(mesh) passes
+/// \throw Error with place: TetGen on a pipe, too many points for the format; UsageError if the
+/// kind is not writable
 void write_tet_mesh(Output& output, const TetMesh& mesh, Kind kind,
                     const Output::Options& beside = {});
 

@@ -28,14 +28,25 @@ static_assert(std::endian::native == std::endian::little, "the codecs copy littl
 TetMesh read_ply(std::string_view bytes, const std::string& name, TetReadStats& stats);
 TetMesh read_vtu(std::string_view bytes, const std::string& name, TetReadStats& stats);
 TetMesh read_msh(std::string_view bytes, const std::string& name, TetReadStats& stats);
+TetMesh read_vtk(std::string_view bytes, const std::string& name, TetReadStats& stats);
+TetMesh read_inp(std::string_view bytes, const std::string& name, TetReadStats& stats);
 TetMesh read_medit(std::string_view bytes, const std::string& name, TetReadStats& stats);
 void write_ply(const TetMesh& mesh, const Sink& sink);
 void write_vtu(const TetMesh& mesh, const Sink& sink);
+void write_vtk(const TetMesh& mesh, const Sink& sink);
+void write_inp(const TetMesh& mesh, const Sink& sink);
 void write_msh2(const TetMesh& mesh, const Sink& sink);
 void write_msh4(const TetMesh& mesh, const Sink& sink);
 void write_medit(const TetMesh& mesh, const Sink& sink);
 void write_node(const TetMesh& mesh, const Sink& sink);
 void write_ele(const TetMesh& mesh, const Sink& sink);
+
+/// VTK's types of cells.
+inline constexpr int vtk_linear = 10, vtk_quadratic = 24;
+/// Points, lines, triangles and polygons, which readers pass over.
+bool is_lower_cell(std::int64_t type);
+/// "hexahedra" and the like, for messages.
+std::string refused_cell_name(std::int64_t type);
 
 using ply::quoted;
 using text::Words;

@@ -7,48 +7,7 @@
 namespace gewebe::tet {
 namespace {
 
-constexpr int linear = 10, quadratic = 24;
-
-/// Points, lines, triangles, polygons: passed over.
-bool is_lower(std::int64_t type) {
-  constexpr std::array<std::int64_t, 18> types{0, 1,  2,  3,  4,  5,  6,  7,  8,
-                                               9, 21, 22, 23, 28, 30, 34, 35, 36};
-  return std::ranges::find(types, type) != types.end();
-}
-
-std::string refused_name(std::int64_t type) {
-  switch (type) {
-  case 11:
-    return "voxels";
-  case 12:
-  case 25:
-  case 29:
-  case 33:
-  case 72:
-  case 79:
-    return "hexahedra";
-  case 13:
-  case 26:
-  case 31:
-  case 32:
-  case 73:
-  case 80:
-    return "wedges";
-  case 14:
-  case 27:
-  case 37:
-  case 74:
-  case 81:
-    return "pyramids";
-  case 42:
-    return "polyhedra";
-  case 71:
-  case 78:
-    return "tetrahedra of any order";
-  default:
-    return "cells of type " + std::to_string(type);
-  }
-}
+constexpr int linear = vtk_linear, quadratic = vtk_quadratic;
 
 class VtuReader {
 public:
@@ -85,13 +44,13 @@ private:
     if (material_array != nullptr)
       materials = piece_.integers(*material_array, count);
     for (std::size_t c = 0; c < count; ++c) {
-      if (is_lower(types[c])) {
+      if (is_lower_cell(types[c])) {
         ++stats_.skipped_elements;
         continue;
       }
       if (types[c] != linear && types[c] != quadratic)
         throw Error(piece_.place(types_array),
-                    refused_name(types[c]) + ", expected tetrahedra of 4 or 10 nodes");
+                    refused_cell_name(types[c]) + ", expected tetrahedra of 4 or 10 nodes");
       add(c, cells[c], types[c], materials.empty() ? 0 : materials[c]);
     }
     if (material_array == nullptr)
@@ -119,6 +78,46 @@ private:
 };
 
 } // namespace
+
+bool is_lower_cell(std::int64_t type) {
+  constexpr std::array<std::int64_t, 18> types{0, 1,  2,  3,  4,  5,  6,  7,  8,
+                                               9, 21, 22, 23, 28, 30, 34, 35, 36};
+  return std::ranges::find(types, type) != types.end();
+}
+
+std::string refused_cell_name(std::int64_t type) {
+  switch (type) {
+  case 11:
+    return "voxels";
+  case 12:
+  case 25:
+  case 29:
+  case 33:
+  case 72:
+  case 79:
+    return "hexahedra";
+  case 13:
+  case 26:
+  case 31:
+  case 32:
+  case 73:
+  case 80:
+    return "wedges";
+  case 14:
+  case 27:
+  case 37:
+  case 74:
+  case 81:
+    return "pyramids";
+  case 42:
+    return "polyhedra";
+  case 71:
+  case 78:
+    return "tetrahedra of any order";
+  default:
+    return "cells of type " + std::to_string(type);
+  }
+}
 
 TetMesh read_vtu(std::string_view bytes, const std::string& name, TetReadStats& stats) {
   return VtuReader(bytes, name, stats).read();

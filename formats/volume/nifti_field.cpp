@@ -1,144 +1,12 @@
 #include "formats/volume/nifti_field.h"
 
-#include "base/error.h"
-
-#include <zlib.h>
+#include "formats/volume/gzip_internal.h"
+#include "formats/volume/nifti_header_internal.h"
 
 #include <algorithm>
-#include <array>
-#include <bit>
-#include <cmath>
-#include <cstring>
-#include <optional>
-// Based on: NIfTI-1 data format (DFWG, nifti.nimh.nih.gov, 2004).
 
 namespace gewebe {
 namespace {
-
-static_assert(std::endian::native == std::endian::little, "the header is little-endian memory");
-
-constexpr std::size_t header_bytes = 352; // with the flag that no extension follows
-
-class Header {
-public:
-  template <class T>
-  void put(std::size_t at, T value) {
-    std::memcpy(bytes_.data() + at, &value, sizeof(T));
-  }
-  void put_real(std::size_t at, double value) { put(at, static_cast<float>(value)); }
-  void put_text(std::size_t at, std::string_view text) {
-    std::ranges::copy(text, bytes_.begin() + static_cast<std::ptrdiff_t>(at));
-  }
-  std::string_view bytes() const { return {bytes_.data(), bytes_.size()}; }
-
-private:
-  std::array<char, header_bytes> bytes_{};
-};
-
-Vec3 column(const GridTransform& t, std::size_t axis) {
-  return {t.m[axis], t.m[4 + axis], t.m[8 + axis]};
-}
-
-/// A rotation, by its columns, as a quaternion of positive real part: b, c, d.
-Vec3 quaternion(const Vec3& x, const Vec3& y, const Vec3& z) {
-  // The largest of the four squares, for its root.
-  const double a2 = 1 + x.x + y.y + z.z, b2 = 1 + x.x - y.y - z.z, c2 = 1 - x.x + y.y - z.z,
-               d2 = 1 - x.x - y.y + z.z;
-  double a = 0;
-  Vec3 q;
-  if (a2 >= b2 && a2 >= c2 && a2 >= d2) {
-    a = 0.5 * std::sqrt(a2);
-    q = Vec3{y.z - z.y, z.x - x.z, x.y - y.x} * (0.25 / a);
-  } else if (b2 >= c2 && b2 >= d2) {
-    const double b = 0.5 * std::sqrt(b2);
-    q = {b, 0.25 / b * (y.x + x.y), 0.25 / b * (z.x + x.z)};
-    a = 0.25 / b * (y.z - z.y);
-  } else if (c2 >= d2) {
-    const double c = 0.5 * std::sqrt(c2);
-    q = {0.25 / c * (y.x + x.y), c, 0.25 / c * (z.y + y.z)};
-    a = 0.25 / c * (z.x - x.z);
-  } else {
-    const double d = 0.5 * std::sqrt(d2);
-    q = {0.25 / d * (z.x + x.z), 0.25 / d * (z.y + y.z), d};
-    a = 0.25 / d * (x.y - y.x);
-  }
-  return a < 0 ? q * -1.0 : q;
-}
-
-void put_place(Header& h, const GridTransform& t) {
-  const Vec3 size = t.voxel_size();
-  h.put_real(80, size.x);
-  h.put_real(84, size.y);
-  h.put_real(88, size.z);
-  for (std::size_t n = 0; n < 12; ++n) // srow_x, srow_y, srow_z
-    h.put_real(280 + 4 * n, t.m[n]);
-  h.put<std::int16_t>(254, 1); // sform_code: scanner
-  const Vec3 x = column(t, 0) * (1 / size.x), y = column(t, 1) * (1 / size.y),
-             z = column(t, 2) * (1 / size.z);
-  const double mirrored = dot(cross(x, y), z) < 0 ? -1 : 1;
-  h.put_real(76, mirrored); // qfac
-  if (!(std::fabs(dot(x, y)) < 1e-6 && std::fabs(dot(y, z)) < 1e-6 && std::fabs(dot(z, x)) < 1e-6))
-    return;
-  h.put<std::int16_t>(252, 1); // qform_code
-  const Vec3 q = quaternion(x, y, z * mirrored);
-  for (const auto& [at, value] :
-       {std::pair(256, q.x), {260, q.y}, {264, q.z}, {268, t.m[3]}, {272, t.m[7]}, {276, t.m[11]}})
-    h.put_real(static_cast<std::size_t>(at), value);
-}
-
-Header header_of(const Int3& size, const GridTransform& transform, const std::string& what) {
-  Header h;
-  h.put<std::int32_t>(0, 348);
-  h.put<char>(38, 'r'); // regular
-  const std::array<int, 8> dim{5, size[0], size[1], size[2], 1, 3, 1, 1};
-  for (std::size_t n = 0; n < dim.size(); ++n)
-    h.put(40 + 2 * n, static_cast<std::int16_t>(dim[n]));
-  h.put<std::int16_t>(68, 1007); // intent_code: VECTOR
-  h.put<std::int16_t>(70, 16);   // datatype: float32
-  h.put<std::int16_t>(72, 32);   // bitpix
-  for (const std::size_t at : {92U, 96U, 100U, 104U})
-    h.put_real(at, 1);
-  put_place(h, transform);
-  h.put_real(108, header_bytes); // vox_offset
-  h.put_real(112, 1);            // scl_slope
-  h.put<std::uint8_t>(123, 2);   // xyzt_units: mm
-  h.put_text(148, std::string_view(what).substr(0, 79));
-  h.put_text(344, std::string_view("n+1\0", 4));
-  return h;
-}
-
-/// gzip, its head without time or name.
-class Packed {
-public:
-  explicit Packed(const std::function<void(std::string_view)>& sink) : sink_(sink) {
-    if (deflateInit2(&stream_, 6, Z_DEFLATED, 15 + 16, 8, Z_DEFAULT_STRATEGY) != Z_OK)
-      throw Error("zlib can't begin to pack, expected memory for it");
-  }
-  ~Packed() { deflateEnd(&stream_); }
-  Packed(const Packed&) = delete;
-  Packed& operator=(const Packed&) = delete;
-
-  void write(std::string_view bytes) { pack(bytes, Z_NO_FLUSH); }
-  void finish() { pack({}, Z_FINISH); }
-
-private:
-  void pack(std::string_view bytes, int flush) {
-    // zlib does not write there.
-    stream_.next_in = reinterpret_cast<Bytef*>(const_cast<char*>(bytes.data()));
-    stream_.avail_in = static_cast<uInt>(bytes.size());
-    do {
-      stream_.next_out = reinterpret_cast<Bytef*>(out_.data());
-      stream_.avail_out = static_cast<uInt>(out_.size());
-      if (deflate(&stream_, flush) == Z_STREAM_ERROR)
-        throw Error("zlib can't pack");
-      sink_({out_.data(), out_.size() - stream_.avail_out});
-    } while (stream_.avail_out == 0);
-  }
-
-  const std::function<void(std::string_view)>& sink_;
-  z_stream stream_{};
-  std::array<char, 1 << 16> out_{};
-};
 
 void write_components(const LatticeField& field, float outside,
                       const std::function<void(std::string_view)>& sink) {
@@ -160,9 +28,11 @@ void write_components(const LatticeField& field, float outside,
 } // namespace
 
 PlaceLattice voxel_centres(const Int3& size, const GridTransform& transform) {
-  const Vec3 origin = column(transform, 3);
-  return {origin,
-          {column(transform, 0), column(transform, 1), column(transform, 2)},
+  const auto column = [&m = transform.m](std::size_t axis) {
+    return Vec3{m[axis], m[4 + axis], m[8 + axis]};
+  };
+  return {column(3),
+          {column(0), column(1), column(2)},
           {static_cast<std::size_t>(size[0]), static_cast<std::size_t>(size[1]),
            static_cast<std::size_t>(size[2])}};
 }
@@ -170,13 +40,15 @@ PlaceLattice voxel_centres(const Int3& size, const GridTransform& transform) {
 void write_nifti_field(const LatticeField& field, const Int3& size, const GridTransform& transform,
                        float outside, const std::string& what, bool gzip,
                        const std::function<void(std::string_view)>& sink) {
-  const Header header = header_of(size, transform, what);
+  constexpr std::int16_t vector = 1007;
+  const NiftiHeader header =
+      nifti_header({5, size[0], size[1], size[2], 1, 3, 1, 1}, vector, transform, what);
   if (!gzip) {
     sink(header.bytes());
     write_components(field, outside, sink);
     return;
   }
-  Packed packed(sink);
+  GzipWriter packed(sink);
   packed.write(header.bytes());
   write_components(field, outside, [&](std::string_view bytes) { packed.write(bytes); });
   packed.finish();

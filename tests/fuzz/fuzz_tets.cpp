@@ -17,7 +17,9 @@ namespace {
 using namespace gewebe;
 
 TetMesh mesh_of(std::string_view bytes) {
-  const Kind kind = kind_from_magic(bytes.substr(0, 4096));
+  Kind kind = kind_from_magic(bytes.substr(0, 4096));
+  if (kind == Kind::unknown && bytes.starts_with('*')) // no other format begins so
+    kind = Kind::inp;
   constexpr std::string_view border = "# ele\n";
   const std::size_t at = bytes.find(border);
   if (kind != Kind::unknown || at == std::string_view::npos)
@@ -33,7 +35,8 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   try {
     TetMesh mesh = mesh_of({reinterpret_cast<const char*>(data), size});
     check_mesh(mesh);
-    for (const Kind kind : {Kind::ply, Kind::vtu, Kind::msh, Kind::msh4, Kind::medit}) {
+    for (const Kind kind :
+         {Kind::ply, Kind::vtu, Kind::msh, Kind::msh4, Kind::medit, Kind::vtk, Kind::inp}) {
       const std::string bytes = tet_mesh_bytes(mesh, kind);
       if (tet_mesh_bytes(tet_mesh_from_bytes(bytes, "again", kind), kind) != bytes)
         std::abort();

@@ -1,6 +1,8 @@
-// Any bytes are a surface of VTK or an Error, and a surface survives being written as PLY.
+// Any bytes are a surface of VTK, in XML or legacy, or an Error, and a surface survives being
+// written as PLY.
 #include "base/error.h"
 #include "formats/mesh/ply.h"
+#include "formats/mesh/vtk_legacy.h"
 #include "formats/mesh/vtp.h"
 
 #include <cstdlib>
@@ -9,7 +11,9 @@
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   using namespace gewebe;
   try {
-    const TriangleMesh mesh = read_vtp({reinterpret_cast<const char*>(data), size}, "fuzz");
+    const std::string_view input(reinterpret_cast<const char*>(data), size);
+    const TriangleMesh mesh = input.starts_with("# vtk") ? read_vtk_surface(input, "fuzz", nullptr)
+                                                         : read_vtp(input, "fuzz");
     check_mesh(mesh);
     const std::string bytes = write_ply(mesh);
     if (write_ply(read_ply(bytes, "again")) != bytes)

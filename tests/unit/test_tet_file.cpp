@@ -31,7 +31,8 @@ namespace {
 using test::put;
 using test::same_bytes;
 
-const std::vector<Kind> in_memory{Kind::ply, Kind::vtu, Kind::msh, Kind::msh4, Kind::medit};
+const std::vector<Kind> in_memory{Kind::ply,  Kind::vtu,   Kind::msh,
+                                  Kind::msh4, Kind::medit, Kind::vtk};
 
 std::string complaint(const std::string& bytes, Kind kind) {
   return test::complaint([&] { return tet_mesh_from_bytes(bytes, "m", kind); });
@@ -182,6 +183,9 @@ TEST(TetFile, KindsByName) {
   EXPECT_EQ(kind_from_suffix("a.mesh"), Kind::medit);
   EXPECT_EQ(kind_from_suffix("a.1.node"), Kind::tetgen);
   EXPECT_EQ(kind_from_suffix("a.1.ele"), Kind::tetgen);
+  EXPECT_EQ(kind_from_suffix("a.vtk"), Kind::vtk);
+  EXPECT_EQ(kind_from_suffix("a.INP"), Kind::inp);
+  EXPECT_EQ(kind_from_magic("# vtk DataFile Version 3.0\n"), Kind::vtk);
   EXPECT_EQ(kind_from_suffix("a.msh4"), Kind::unknown);
   EXPECT_EQ(kind_from_suffix("a.tetgen"), Kind::unknown);
   for (const Kind kind : writable_tet_kinds())
@@ -192,8 +196,22 @@ TEST(TetFile, KindsByName) {
             Kind::unknown);
   EXPECT_EQ(kind_from_magic("# a\n\nMeshVersionFormatted 2"), Kind::medit);
   EXPECT_EQ(complaint("", Kind::obj),
-            "m: obj has no tetrahedra, expected one of ply, vtu, msh, medit, tetgen by content, "
-            "suffix or --format");
+            "m: obj has no tetrahedra, expected one of ply, vtu, msh, medit, tetgen, vtk, inp by "
+            "content, suffix or --format");
+}
+
+// Abaqus and CalculiX read 20 characters of a number: what is longer is rounded, once.
+TEST(TetFile, InpHasNumbersOf20Characters) {
+  TetMesh mesh = test::box_tetrahedra(1, 1, 1);
+  mesh.points[0] = {-1.2345678901234567e-5, 0.1, 1.0 / 3};
+  const std::string bytes = tet_mesh_bytes(mesh, Kind::inp);
+  EXPECT_NE(bytes.find("1, -1.2345678901235e-05, 0.1, 0.3333333333333333\n"), std::string::npos)
+      << bytes;
+  const TetMesh again = tet_mesh_from_bytes(bytes, "m", Kind::inp);
+  EXPECT_EQ(again.tetrahedra, mesh.tetrahedra);
+  EXPECT_NEAR(again.points[0].x, mesh.points[0].x, 1e-18);
+  EXPECT_EQ(again.points[1], mesh.points[1]);
+  EXPECT_EQ(tet_mesh_bytes(again, Kind::inp), bytes);
 }
 
 // ---- What others write
@@ -456,9 +474,23 @@ std::vector<std::pair<Kind, std::string>> samples() {
   return all;
 }
 
+TEST(TetFile, VtkEndsBehindASection) {
+  TetMesh mesh = strange();
+  mesh.material = {1, 4};
+  const std::string bytes = tet_mesh_bytes(mesh, Kind::vtk);
+  for (std::size_t size = 0; size + 1 < bytes.size(); ++size) {
+    const std::string_view next = std::string_view(bytes).substr(size);
+    const bool border = next.starts_with("CELL_DATA") || next.starts_with("\nCELL_DATA") ||
+                        next.starts_with("SCALARS") || next.starts_with("\nSCALARS");
+    EXPECT_EQ(is_mesh(bytes.substr(0, size), Kind::vtk), border) << size;
+  }
+}
+
 TEST(TetFile, EveryPrefixIsAnError) {
   for (const auto& [kind, bytes] : samples()) {
     ASSERT_TRUE(is_mesh(bytes, kind));
+    if (kind == Kind::vtk) // a legacy file may end behind any section, see VtkEndsBehindASection
+      continue;
     // Behind the last word blanks may lack, and in Medit all that follows the tetrahedra.
     const std::size_t end =
         kind == Kind::medit ? bytes.rfind("\n1 ") + 1 : bytes.find_last_not_of(" \n") + 1;
@@ -595,7 +627,7 @@ TEST(TetFile, ForOtherPrograms) {
   for (const bool quadratic : {false, true}) {
     const std::string stem = folder + (quadratic ? "/quadratic" : "/linear");
     const TetMesh mesh = test::odd_tetrahedra(quadratic, true);
-    for (const char* const suffix : {".ply", ".vtu", ".msh", ".4.msh", ".mesh", ".node"}) {
+    for (const char* const suffix : {".ply", ".vtu", ".msh", ".4.msh", ".mesh", ".node", ".vtk"}) {
       write(stem + suffix, mesh,
             suffix == std::string(".4.msh") ? Kind::msh4 : kind_from_suffix(suffix));
       EXPECT_TRUE(same_bytes(read(stem + suffix), mesh)) << suffix;

@@ -6,6 +6,7 @@
 #include "tools/render/render_layer.h"
 #include "tools/render/render_lighting.h"
 #include "tools/render/render_materials.h"
+#include "tools/render/render_page.h"
 #include "tools/render/render_volume.h"
 
 #include <algorithm>
@@ -261,6 +262,7 @@ void declare(Program& p, RenderArguments& a) {
            "frame of a result from 0; -1, the default, is the last")
       .range(-1, 1e15);
   p.option("--frames", a.frames, "A:B:STEP", "a picture of each of these frames, or all");
+  p.option("--fps", a.rate, "N", "pictures per second of a film (default 25)").range(0.1, 1000);
   p.option("--turn", a.turn, "N", "the camera goes around once in N pictures").range(1, 100000);
   p.option("--turn-light", a.turn_light, "N", "the light goes around once in N pictures")
       .range(1, 100000);
@@ -268,7 +270,10 @@ void declare(Program& p, RenderArguments& a) {
       .one_of(surface_unit_names());
   declare_field(p, a);
   declare_volume(p, a);
-  p.check([&a] { complete(a); });
+  p.check([&p, &a] {
+    note_look_options(p, a);
+    complete(a);
+  });
 }
 
 } // namespace gewebe::cli

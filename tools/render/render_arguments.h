@@ -61,6 +61,7 @@ struct RenderArguments {
   SurfaceReadOptions reading;
   std::string frames;                           ///< of a result, "": one
   std::optional<std::int64_t> turn, turn_light; ///< pictures in one turn
+  std::optional<double> rate;                   ///< of a film, pictures per second
   bool no_instruments = false;                  ///< of a result
   std::optional<Vec3> instrument_color;         ///< else that of steel
   CameraOptions camera;
@@ -68,6 +69,7 @@ struct RenderArguments {
   UvOptions mapping;
   PictureOptions picture;
   RenderVolume volume;
+  std::vector<std::string> look_options; ///< given options of looks and views
 
   // Words that declare() turns into the above.
   struct Words {

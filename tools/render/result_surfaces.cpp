@@ -2,7 +2,6 @@
 
 #include "base/error.h"
 #include "contact/instrument_surface.h"
-#include "formats/results/results.h"
 #include "tetrahedra/order.h"
 #include "tools/render/solid_surface.h"
 
@@ -83,6 +82,8 @@ std::size_t pieces_along(double length, double radius) {
   return static_cast<std::size_t>(std::clamp(std::ceil(length / (2 * radius)), 1.0, most));
 }
 
+} // namespace
+
 Surface instrument_surface(ResultInstrument of, std::size_t ring) {
   const Vec3 along = of.ends[1] - of.ends[0];
   // Back into its own coordinates.
@@ -122,8 +123,6 @@ Surface instrument_surface(ResultInstrument of, std::size_t ring) {
   surface.rest = std::move(own.points);
   return surface;
 }
-
-} // namespace
 
 std::vector<Surface> read_result_surfaces(const Input& input, const SurfaceReadOptions& options,
                                           SolidReport& report) {

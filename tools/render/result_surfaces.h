@@ -2,6 +2,7 @@
 // What is drawn of a frame of a run: surfaces, solids cut open at their deformed shape, and values
 // of a field as texture coordinates of a ramp.
 
+#include "formats/results/results.h"
 #include "formats/stream/stream.h"
 #include "shading/drawing.h"
 #include "texture/color_ramp.h"
@@ -24,6 +25,10 @@ namespace gewebe {
 /// and a plane that takes all of all away
 std::vector<Surface> read_result_surfaces(const Input& input, const SurfaceReadOptions& options,
                                           SolidReport& report);
+
+/// An instrument at its pose, with its own normals and its shape around its own origin as rest.
+/// \param ring  corners of its rings, as round_surface has them
+Surface instrument_surface(ResultInstrument of, std::size_t ring);
 
 /// The least and the greatest value of options.field at any node of the drawn objects in some
 /// frames (-1 is the last). \throw Error as above

@@ -16,7 +16,8 @@ struct VolumeOutput {
 /// Declares --to and --uncompressed.
 void declare(cli::Program& program, VolumeOutput& options);
 
-/// Opens what --output names. \throw UsageError if --to or its suffix says another kind than vdb
+/// Opens what --output names. \throw UsageError if --to or its suffix says a kind that is none of
+/// volumes
 Output open_volume(const cli::Run& run);
 
 /// Writes and commits.
