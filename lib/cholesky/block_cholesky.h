@@ -16,7 +16,7 @@ namespace gewebe {
 /// its neighbours cost, and a single one what a dense matrix does.
 class BlockCholesky {
 public:
-  /// \param matrix  by columns, of which the lower triangle is read; overwritten
+  /// \param matrix by columns; its lower triangle is read; overwritten
   /// \param group  of each unknown \param coupled  row-major table of groups: not 0 where their
   /// block isn't, symmetric
   /// \return whether it is positive definite; if not, there is nothing to solve with

@@ -97,10 +97,11 @@ FrontBlocks front_blocks(const FrontTree& tree, std::span<const std::uint8_t> ax
 double update_bytes(const FrontTree& tree, std::span<const Front> fronts, bool keep_updates,
                     int threads);
 
-/// Computes the fronts that are wanted (all, where that is empty); ancestors of what is wanted are
-/// wanted too. Subtrees of little work go to one thread each, what is above them has all threads.
+/// Computes the selected fronts: those f with selected[f] != 0, or all where it is empty. Ancestors
+/// of a selected front must be selected too. A small subtree is computed by one thread, the fronts
+/// above such subtrees by all threads.
 /// \throw PivotTooSmall (of the first front that has one), Cancelled
-FrontalWork factorise(const Multifrontal& task, std::span<const char> wanted,
+FrontalWork factorise(const Multifrontal& task, std::span<const char> selected,
                       const Context& context);
 
 } // namespace gewebe
