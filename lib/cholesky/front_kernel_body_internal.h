@@ -1,5 +1,6 @@
 #pragma once
-// The body of front_kernel_*.cpp; each of these files compiles it for one instruction set.
+// Body of front_kernel_*.cpp: dense Cholesky and update of a front by register tiles. Each of these
+// files compiles it for one instruction set.
 
 #include "cholesky/front_kernel_internal.h"
 #include "cholesky/fused_internal.h"
