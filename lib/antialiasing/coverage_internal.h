@@ -1,11 +1,12 @@
 #pragma once
-// What exact_coverage and line_coverage share: sums along k, slab by slab. Internal to the
-// voxelizer.
+// Accumulates the covered volume of voxels from patches of the surface, for exact_coverage and
+// line_coverage. Internal to the voxelizer.
 //
-// In index space moved by ½, so that voxel (i, j, k) is [i, i+1) x [j, j+1) x [k, k+1). A patch of
-// surface in voxel k of a column, seen from below as area A with the volume V between it and the
-// voxel's top, adds V to voxel k and A to each voxel above. Kept are the differences along k: V at
-// k, A - V at k + 1.
+// Coordinates are those of index space moved by ½, so that voxel (i, j, k) is [i, i+1) x [j, j+1) x
+// [k, k+1). Consider a patch of surface in voxel k of a column, with the area A projected along k
+// and the volume V between it and the voxel's top. It adds V to voxel k and A to each voxel above.
+// Only the differences along k are stored: V at k, A - V at k + 1. Their prefix sums are the
+// covered volumes.
 
 #include "antialiasing/coverage.h"
 #include "base/memory_account.h"

@@ -1,5 +1,6 @@
 #pragma once
-// The nearest triangle of each voxel near a surface. Internal to the voxelizer.
+// Grey values in a band of voxels along a surface, from the nearest triangle of each voxel.
+// Internal to the voxelizer.
 
 #include "antialiasing/buried_faces_internal.h"
 #include "antialiasing/coverage_internal.h"
@@ -9,8 +10,8 @@
 
 namespace gewebe {
 
-/// Distance that the ramp takes for voxel centre `p` whose nearest triangle is `triangle`; >= 0, in
-/// voxels.
+/// Distance of voxel centre `p`, whose nearest triangle is `triangle`, from the surface; >= 0, in
+/// voxels. Methods differ in this function.
 using RampDistance =
     std::function<double(const SlabbedMesh& mesh, const Vec3& p, std::uint32_t triangle)>;
 

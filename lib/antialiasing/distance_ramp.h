@@ -1,11 +1,12 @@
 #pragma once
-// Grey values of voxelization from the distance to the surface: the two published ways that the
-// report names beside its own (FZKA 7190, section 5: [Jon96], [SK99]).
+// Grey values of voxels from their distance to the surface, by the two published methods with which
+// the report compares its own (FZKA 7190, section 5: [Jon96], [SK99]).
 //
 // Both give ½ at the surface and fall linearly from 1 to 0 across it, from -h inside to +h outside,
-// h in voxels. The distance is known in that band only; beyond it a voxel is 0 or 1 by the rule,
-// which gives the sign too. Unlike coverage.h neither keeps the volume of bent surfaces, thin walls
-// or edges; but their values change evenly across the surface, so that its normals come out right.
+// h in voxels. The distance is computed in that band only. Elsewhere a voxel is 0 or 1 by the rule
+// of inside and outside (VoxelRule), which gives the sign of the distance too. Unlike coverage.h,
+// neither method keeps the volume at bent surfaces, thin walls or edges. But their values change
+// evenly across the surface, so that gradients give accurate normals.
 //
 // By the winding rule the distance of a voxel inside is that to the boundary of the solid
 // (buried_faces_internal.h): faces with the inside on both sides, where solids overlap or touch, do

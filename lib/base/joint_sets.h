@@ -19,7 +19,7 @@ namespace gewebe {
 /// named by its smallest member, so that names depend neither on the order of pairs nor on threads.
 class JointSets {
 public:
-  /// Begins with pairs: of each item and one that is not above it.
+  /// Starts from one pair for each item: the item and an item with the same or a smaller number.
   explicit JointSets(std::vector<std::uint32_t> not_above) : parent_(std::move(not_above)) {}
   /// \pre a, b < count
   void join(std::uint32_t a, std::uint32_t b) {

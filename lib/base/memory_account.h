@@ -1,5 +1,5 @@
 #pragma once
-// What parallel work allocates, held against the limit of its context.
+// Count of the memory that parallel work has allocated, checked against Context::max_memory.
 
 #include "base/context.h"
 
@@ -9,7 +9,7 @@
 
 namespace gewebe {
 
-/// Sum of what parallel work has allocated, for work whose size no estimate bounds.
+/// Number of bytes allocated by all threads, for work whose memory cannot be estimated before.
 class MemoryAccount {
 public:
   /// `what` names the result and must outlive the account.

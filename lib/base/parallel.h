@@ -1,8 +1,7 @@
 #pragma once
-// Parallel loops whose result does not depend on the number of threads: `grain` alone determines
-// the blocks, each block writes its own slots, and a caller that needs a sum adds the slots in
-// order
-// afterwards.
+// Parallel loops whose result does not depend on the number of threads. `grain` alone determines
+// the blocks, and each block writes its own slots. A caller that needs a sum adds the slots in
+// order afterwards.
 
 #include "base/context.h"
 

@@ -12,14 +12,14 @@
 namespace gewebe {
 
 /// Multifrontal factor of a matrix whose unknowns are in groups: a block of two groups is dense or
-/// 0. Groups are eliminated by least fronts (minimum degree), so that a chain of groups costs what
-/// its neighbours cost, and a single one what a dense matrix does.
+/// 0. Groups are eliminated in the order of minimum degree. So the cost of a chain of groups is
+/// linear in its length, and that of a single group is that of a dense matrix.
 class BlockCholesky {
 public:
-  /// \param matrix  by columns, of which the lower triangle is read; overwritten
+  /// \param matrix by columns; its lower triangle is read; overwritten
   /// \param group  of each unknown \param coupled  row-major table of groups: not 0 where their
   /// block isn't, symmetric
-  /// \return whether it is positive definite; if not, there is nothing to solve with
+  /// \return whether the matrix is positive definite; if not, solve() must not be called
   /// \pre matrix.size() == group.size()^2; groups are numbered below the root of coupled.size()
   bool factor(std::span<double> matrix, std::span<const std::uint32_t> group,
               std::span<const std::uint8_t> coupled, CpuLevel cpu);

@@ -1,5 +1,5 @@
 #pragma once
-// The sparsity of a symmetric matrix by its nodes, each of which stands for up to three rows.
+// The sparsity of a symmetric matrix by its nodes; a node stands for up to three rows.
 
 #include <cstddef>
 #include <cstdint>

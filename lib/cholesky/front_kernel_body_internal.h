@@ -1,5 +1,6 @@
 #pragma once
-// The body of front_kernel_*.cpp, each of which compiles it for its instruction set.
+// Body of front_kernel_*.cpp: dense Cholesky and update of a front by register tiles. Each of these
+// files compiles it for one instruction set.
 
 #include "cholesky/front_kernel_internal.h"
 #include "cholesky/fused_internal.h"
@@ -278,7 +279,7 @@ inline void solve(const FrontArrays& f, std::size_t begin, std::size_t count,
                 strips.start(strip), strips.missing(strip));
 }
 
-/// Tiles on the diagonal, of which only what is on and below it exists.
+/// Tiles on the diagonal. Only their entries on and below the diagonal exist.
 inline void update_corner(double* const* columns, std::ptrdiff_t start, std::size_t missing,
                           std::size_t count, const double* a) {
   double square[strip_rows][strip_rows] = {};
@@ -312,8 +313,8 @@ inline void update_corner(double* const* columns, std::ptrdiff_t start, std::siz
       columns[j][start + static_cast<std::ptrdiff_t>(i)] = square[j][i];
 }
 
-/// A tile comes to the first cache while the one before it is computed; fetched earlier, it would
-/// give way to the strips.
+/// A tile comes to the first cache while the one before it is computed; fetched earlier, the strips
+/// would replace it there.
 inline void fetch_tile(double* const* columns, std::ptrdiff_t start) {
   for (std::size_t j = 0; j < tile_columns; ++j) {
     __builtin_prefetch(columns[j] + start, 1);

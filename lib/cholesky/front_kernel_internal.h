@@ -1,7 +1,8 @@
 #pragma once
-// The dense part of a front: Cholesky of what it eliminates, and its update matrix. Once per CPU
-// level. Every level gives the same bits, whatever the blocks: each entry loses its products one by
-// one in the order of elimination, each rounded once (fused).
+// Dense kernel of the multifrontal Cholesky factorisation: factors the columns that a front
+// eliminates, and computes its update matrix. It is compiled once per CPU level. Every level gives
+// the same bits, whatever the size of blocks: products are subtracted from an entry one by one, in
+// the order of elimination, by fused operations.
 
 #include "cholesky/front_layout.h"
 

@@ -9,8 +9,8 @@ namespace gewebe {
 inline constexpr std::size_t front_block = 128;
 
 /// Where column c of a front's L begins, at the first row of its block: what is above a block isn't
-/// there, so that little more is than L's own entries. Of the column behind the last one: how many
-/// numbers L has. \pre c <= rows
+/// there, so that little more is than L's own entries. For the column behind the last one, the
+/// result is how many numbers L has. \pre c <= rows
 constexpr std::size_t front_offset(std::size_t rows, std::size_t c) {
   const std::size_t first = c / front_block * front_block; // column and row of the block
   return first * rows - first * (first - front_block) / 2 + (c - first) * (rows - first);

@@ -40,13 +40,13 @@ FrontPlan front_plan(const FrontTree& tree, std::span<const double> under, doubl
 /// Two stacks of update matrices, of some fronts that are computed one after the other.
 class UpdateStacks {
 public:
-  /// Tells without any memory how much a stack needs.
+  /// Counts how much memory a stack needs, without allocating it.
   struct Size {
     std::array<std::size_t, 2> now{}, peak{};
 
     void push(std::uint8_t stack, std::size_t below);
     void pop(std::uint8_t stack, std::size_t below);
-    /// A front is computed, after those it is told of before.
+    /// Adds the computation of front f, in the order of the calls.
     void compute(const FrontPlan& plan, std::span<const Front> fronts, std::size_t f);
     std::size_t numbers() const { return peak[0] + peak[1]; }
   };

@@ -35,7 +35,7 @@ std::vector<std::uint32_t> elimination_tree(const BlockGraph& graph,
       count += earlier[count] < k ? 1U : 0U;
     }
     for (std::uint32_t at : std::span(earlier).first(count))
-      while (at < k) { // climbs, and shortens the way for who comes later
+      while (at < k) { // climbs, and shortens the path for later searches
         const std::uint32_t next = std::exchange(ancestor[at], k);
         if (next == none) {
           parent[at] = k;
@@ -168,8 +168,8 @@ private:
     runs_.push_back(std::move(run));
   }
 
-  /// Without a branch, since hardly anything tells which are new. Marks of who is not later than
-  /// the position that is added are read no more.
+  /// Without a branch, since the processor cannot predict which are new. Marks of nodes that are
+  /// not later than the added position are not read again.
   void reach(std::uint32_t b, bool later, std::uint32_t mark) {
     added_[count_] = b;
     count_ += std::size_t{later} & std::size_t{mark_[b] != mark};

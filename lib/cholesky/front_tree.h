@@ -1,7 +1,8 @@
 #pragma once
-// The elimination tree of a stiffness matrix, node by node, with its fronts (Liu, The multifrontal
-// method for sparse matrix solution, 1992): a front eliminates some nodes and leaves to its parent
-// what that means for its boundary, nodes eliminated later.
+// Elimination tree of a stiffness matrix by nodes, with the fronts of the multifrontal method (Liu,
+// The multifrontal method for sparse matrix solution, 1992). A front eliminates some nodes. Its
+// boundary is the set of nodes eliminated later on which this has an effect; the front passes their
+// update matrix to its parent.
 
 #include "cholesky/block_graph.h"
 
@@ -31,10 +32,10 @@ struct FrontTree {
   }
 };
 
-/// The tree for nodes eliminated in this order, or one that fills alike: the order is changed only
-/// so that children come right before their parents. Nodes in one boundary keep their order.
-/// Fronts that share most of their boundary are joined, so that a few zeros are computed with and
-/// larger fronts gained. \pre `order` holds the nodes with free axes, each once
+/// Builds the tree for nodes that are eliminated in this order. The order is changed only so that
+/// children come right before their parents, which keeps the fill. Nodes in one boundary keep their
+/// order. Fronts that share most of their boundary are merged: this adds a few zeros, but larger
+/// fronts are faster. \pre `order` holds the nodes with free axes, each once
 FrontTree front_tree(const BlockGraph& graph, std::span<const std::uint32_t> order);
 
 } // namespace gewebe

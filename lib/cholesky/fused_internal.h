@@ -1,6 +1,6 @@
 #pragma once
-// sum - a b rounded once, as std::fma does it, for processors whose instructions don't: what the
-// library has for them takes some fifty times as long.
+// Fused multiply-subtract in software: sum - a b, rounded once, for processors without FMA
+// instructions. The standard library's std::fma takes some fifty times as long there.
 
 #include <cmath>
 #include <cstddef>

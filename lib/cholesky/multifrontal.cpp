@@ -259,17 +259,17 @@ double update_bytes(const FrontTree& tree, std::span<const Front> fronts, bool k
   return 8 * static_cast<double>(kept + std::max(subtree * at_once, above.numbers()));
 }
 
-FrontalWork factorise(const Multifrontal& task, std::span<const char> wanted,
+FrontalWork factorise(const Multifrontal& task, std::span<const char> selected,
                       const Context& context) {
   const FrontTree& tree = task.tree;
   const std::size_t count = tree.fronts();
-  const auto is_wanted = [&](std::size_t f) { return wanted.empty() || wanted[f] != 0; };
-  std::vector<double> under(count, 0); // operations wanted in the subtree
+  const auto is_selected = [&](std::size_t f) { return selected.empty() || selected[f] != 0; };
+  std::vector<double> under(count, 0); // operations of the subtree's selected fronts
   FrontalWork work{count, 0, 0, 0};
   for (std::size_t f = 0; f < count; ++f) {
     const double one = front_operations(task.fronts[f]);
     work.all_operations += one;
-    if (is_wanted(f)) {
+    if (is_selected(f)) {
       ++work.computed;
       work.operations += one;
       under[f] += one;
@@ -279,7 +279,7 @@ FrontalWork factorise(const Multifrontal& task, std::span<const char> wanted,
   }
   const FrontPlan plan =
       front_plan(tree, under, work.operations, thread_count(context), task.keep_updates);
-  // Those of `some` that are wanted, one after the other.
+  // Computes the selected fronts of `some`, one after the other.
   const auto run = [&](const auto& some, Team& team) {
     UpdateStacks::Size size;
     for (const std::size_t f : some)
@@ -288,7 +288,7 @@ FrontalWork factorise(const Multifrontal& task, std::span<const char> wanted,
     scratch.row.resize(task.axes.size());
     scratch.stacks.prepare(size);
     for (const std::size_t f : some)
-      if (is_wanted(f)) {
+      if (is_selected(f)) {
         if (context.cancelled && context.cancelled())
           throw Cancelled();
         compute(task, plan, f, scratch, context.cpu, team);

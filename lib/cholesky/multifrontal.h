@@ -1,7 +1,7 @@
 #pragma once
-// The numbers of a sparse Cholesky factor, front by front (Liu, The multifrontal method for sparse
-// matrix solution: theory and practice, 1992): a front assembles its rows of the matrix, adds the
-// update matrices of its children (extend-add), eliminates its columns, and leaves an update matrix
+// Multifrontal Cholesky factorisation of a sparse matrix (Liu, The multifrontal method for sparse
+// matrix solution: theory and practice, 1992). A front assembles its rows of the matrix, adds the
+// update matrices of its children (extend-add), eliminates its columns, and passes an update matrix
 // to its parent. The same bits on any number of threads and any CPU level.
 
 #include "base/context.h"
@@ -21,8 +21,8 @@ namespace gewebe {
 /// Memory for numbers of a front.
 class FrontMemory {
 public:
-  /// Makes room for so many numbers, whatever they are then. What is there is kept where it is
-  /// large enough; some more is taken where fronts are to be computed again, for copies of nodes.
+  /// Returns memory for `size` numbers, uninitialised. Memory that is large enough is used again.
+  /// `again`: the front may be computed again, so some more is allocated, for copies of nodes.
   double* reserve(std::size_t size, bool again);
   void release() noexcept;
   double* data() noexcept { return data_.get(); }
@@ -97,10 +97,11 @@ FrontBlocks front_blocks(const FrontTree& tree, std::span<const std::uint8_t> ax
 double update_bytes(const FrontTree& tree, std::span<const Front> fronts, bool keep_updates,
                     int threads);
 
-/// Computes the fronts that are wanted (all, where that is empty); ancestors of what is wanted are
-/// wanted too. Subtrees of little work go to one thread each, what is above them has all threads.
+/// Computes the selected fronts: those f with selected[f] != 0, or all where it is empty. Ancestors
+/// of a selected front must be selected too. A small subtree is computed by one thread, the fronts
+/// above such subtrees by all threads.
 /// \throw PivotTooSmall (of the first front that has one), Cancelled
-FrontalWork factorise(const Multifrontal& task, std::span<const char> wanted,
+FrontalWork factorise(const Multifrontal& task, std::span<const char> selected,
                       const Context& context);
 
 } // namespace gewebe

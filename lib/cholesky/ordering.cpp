@@ -24,7 +24,7 @@ public:
   Common() {
     (void)cholmod_l_start(&common_);
     common_.print = 0;                       // it warns on standard output
-    common_.supernodal = CHOLMOD_SIMPLICIAL; // no more is asked for than the order
+    common_.supernodal = CHOLMOD_SIMPLICIAL; // only the order is needed
     common_.nmethods = 2;                    // the one that fills less
     common_.method[0].ordering = CHOLMOD_AMD;
     common_.method[1].ordering = CHOLMOD_METIS;

@@ -1,5 +1,5 @@
 #pragma once
-// The order of elimination.
+// Elimination order of a sparse matrix that keeps its Cholesky factor small.
 
 #include "cholesky/block_graph.h"
 
@@ -8,9 +8,9 @@
 
 namespace gewebe {
 
-/// An order of elimination for the nodes that stand for rows, by CHOLMOD: of nested dissection
-/// (METIS) and minimum degree (AMD) the one that fills less. It depends on the graph alone: neither
-/// of them calls BLAS. Of several threads that call it, one works and the others wait.
+/// Elimination order of the nodes of a graph, by CHOLMOD. Tries nested dissection (METIS) and
+/// minimum degree (AMD), and returns the order with less fill. The order depends on the graph
+/// alone, because neither method calls BLAS. Concurrent calls run one after the other.
 /// \throw Error if the graph is too large, std::bad_alloc
 std::vector<std::uint32_t> elimination_order(const BlockGraph& graph);
 

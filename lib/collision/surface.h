@@ -1,6 +1,6 @@
 #pragma once
-// Collision surface: vertices of all bodies and instruments with their points, edges and triangles,
-// as plain arrays.
+// Surface for collision detection: vertices of all bodies and instruments, and the points, edges
+// and triangles between them, as plain arrays.
 
 #include "geometry/vec3.h"
 

@@ -1,9 +1,8 @@
 #pragma once
 // Inner loop of elastostatics: a sum of columns of the compliance matrix. It is compiled once per
 // CPU level. Every level gives the same bits, because there is no fused multiplication and each row
-// is summed in the order of the columns. Columns may be float32 or small integers: they are
-// widened, and
-// the sum is double.
+// is summed in the order of the columns. Columns may be float32 or small integers: they are widened
+// to double, and the sum is double.
 
 #include "base/cpu.h"
 

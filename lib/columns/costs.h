@@ -11,7 +11,7 @@ namespace gewebe::costs {
 /// Estimated number of doubles of L, for a factor that is not loaded yet.
 std::size_t usual_entries(std::size_t axes);
 
-/// Number of products from which on several threads pay.
+/// From this number of products on, several threads are faster than one.
 inline constexpr std::size_t worth_threads = 1000000;
 
 // ---- shapes
@@ -26,13 +26,14 @@ std::size_t nodes_worth_a_solve(std::size_t entries, std::size_t axes, bool sing
 /// \param entries  doubles of L
 bool compressed_pay(double numbers, std::size_t entries);
 
-/// Whether to get the columns of nodes for a shape, if their forces came from blocks.
+/// Whether columns of nodes are the cheapest way to a shape, if their forces were computed from a
+/// block of C.
 /// \param nodes  their number
 /// \param stored  whether all columns are stored or in memory
 /// \param shapes  number of shapes with these nodes, this one included
 bool columns_pay_for_shapes(std::size_t nodes, bool stored, int shapes);
 
-/// Number of nodes from which on a check for rigid motion pays.
+/// From this number of nodes on, a check for rigid motion saves time.
 inline constexpr std::size_t worth_modes = 6;
 
 // ---- forces at displaced nodes

@@ -1,5 +1,6 @@
 #pragma once
-// Body of panel_columns_*.cpp. Each of these files compiles it for its instruction set.
+// Body of panel_columns_*.cpp: copies a panel to columns, with the weighted sum of each row. Each
+// of these files compiles it for one instruction set.
 
 #include "columns/panel_columns.h"
 #include "numeric/four_lanes.h"

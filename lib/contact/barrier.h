@@ -30,7 +30,7 @@ BarrierValue barrier(double s, double range);
 /// its d_min.
 double barrier_energy(const ContactPairs& pairs, std::span<const Vec3> x, double kappa);
 
-/// Adds the gradient, pair by pair. Those of one pair sum to zero but for rounding.
+/// Adds the gradient, pair by pair. Those of one pair sum to zero, except for rounding.
 /// \param gradient  by vertex of the surface
 /// \return the energy
 double add_barrier_gradient(const ContactPairs& pairs, std::span<const Vec3> x, double kappa,

@@ -2,7 +2,7 @@
 // Newton's system of a contact problem, condensed to the vertices in contact.
 //
 // All bodies together minimise 1/2 r^T A r + g(S x), r = x - x_free, block-diagonal A, by Newton's
-// method. With the Hessian H of the contact energy g, which is 0 but for active vertices a,
+// method. With the Hessian H of the contact energy g, which is 0 except at active vertices a,
 //
 //   (W_aa^-1 + H) p_a = -(W_aa^-1 r_a + g_a),   p = -r - W_:a q,   q = -W_aa^-1 (r_a + p_a)
 //

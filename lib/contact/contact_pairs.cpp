@@ -147,8 +147,8 @@ void find_active_pairs(const collision::CollisionSurface& surface,
   look(candidates.edge_edge, 2);
   look(candidates.point_triangle, 1);
 
-  // Equal pairs become one. Pairs of edges and of a point and a triangle come once each; the kind
-  // tells them apart.
+  // Equal pairs become one. Pairs of edges and of a point and a triangle come once each; they
+  // differ in kind.
   const auto kind = [](const ContactPair& p) {
     return p.feature.type == DistanceType::point_plane ? 4 : p.eps_x > 0 ? 3 : p.count;
   };

@@ -184,7 +184,7 @@ private:
   double size_ = 0;
 };
 
-/// Of a polygon: twice its area, as long as its normal.
+/// Normal of a polygon, as long as twice its area.
 Vec3 area_of(const std::vector<std::uint32_t>& loop, const std::vector<Vec3>& points) {
   Vec3 sum;
   for (std::size_t k = 1; k + 1 < loop.size(); ++k)

@@ -7,7 +7,7 @@
 //   K e + D (e - e_before)/h + F = 0, e = hand - instrument,
 //
 // (backward Euler, which takes from the hand what damper and spring lose and never gives more).
-// Its place gives way to F, its turn is the hand's.
+// The instrument's position yields to F; its rotation is the hand's.
 
 #include "geometry/vec3.h"
 
@@ -27,7 +27,7 @@ struct CouplingStep {
   double compliance = 0; ///< mm per force at the step's end
   Vec3 free;             ///< e there without a force
 
-  /// \param lag e before \param h its length, s, >= 0: in no time a damper does not give way
+  /// \param lag e before \param h its length, s, >= 0: at h = 0 a damper is rigid
   CouplingStep(const Coupling& coupling, const Vec3& lag, double h) {
     const double damper = coupling.damping > 0 ? coupling.damping / h : 0;
     const double all = coupling.stiffness + damper;
@@ -38,7 +38,7 @@ struct CouplingStep {
   Vec3 lag(const Vec3& force) const { return free - compliance * force; }
 };
 
-/// Of the radius: an instrument that is led no further in a step has come to rest.
+/// Part of the radius. An instrument that moves no further than this in a step is at rest.
 inline constexpr double led_to_rest = 1e-9;
 
 } // namespace gewebe

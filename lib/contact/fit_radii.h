@@ -1,7 +1,7 @@
 #pragma once
-// Radii that leave room between surfaces where a step begins. d_min of a pair counts on d_hat, and
-// so on all that is in an island; where that has changed, or a shape was made anew, what was in
-// contact before may stand too near.
+// Radii that leave a gap between surfaces at the beginning of a step. d_min of a pair depends on
+// d_hat, and so on all members of an island. Where members or a shape have changed, surfaces that
+// were in contact before may be too close.
 
 #include "collision/candidates.h"
 #include "contact/step.h"

@@ -67,7 +67,7 @@ enum class InstrumentKind : std::uint8_t { sphere = 1, capsule = 2, blade = 3, m
 InstrumentKind kind_of(const InstrumentShape& shape);
 /// "sphere", "capsule", "blade", "mesh".
 const char* instrument_kind_name(InstrumentKind kind);
-/// How far the origin's farthest point is, but for the radius.
+/// Distance of the shape's farthest point from its origin, without the radius.
 double reach_of(const InstrumentShape& shape);
 
 /// An instrument at one moment.

@@ -1,5 +1,5 @@
 #pragma once
-// Instruments as triangles, for who shows them.
+// Instruments as triangles, for pictures of them.
 
 #include "contact/instrument.h"
 #include "geometry/mesh.h"

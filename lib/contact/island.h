@@ -30,7 +30,8 @@ struct BodySurface {
   /// By vertex: the piece that holds it, counted over all surfaces of the island, or
   /// collision::no_owner; empty: none is held.
   std::vector<std::uint32_t> holder;
-  /// By vertex: which of the surface's pieces it is of, for who may meet; empty: all of the first.
+  /// By vertex: the surface's piece that it belongs to, which decides what it may be in contact
+  /// with; empty: all are of the first.
   std::vector<std::uint32_t> piece;
   std::uint32_t pieces = 1;
   double radius = 0; ///< the surface lies so far outside, mm

@@ -28,7 +28,7 @@ inline double smooth_step(double x) {
   return x * x * (3 - 2 * x);
 }
 
-/// Factor of a load that pulses with `period` s: 0 at every whole period, 1 in the midst of it,
+/// Factor of a load that pulses with `period` s: 0 at every whole period, 1 in the middle of it,
 /// near to (1 - cos)/2 but the same bytes on every machine. 1 for period 0. \pre time >= 0
 inline double pulse(double time, double period) {
   if (!(period > 0))
@@ -93,9 +93,9 @@ struct Load {
 /// at rest, and displacements.
 Load load_at(const Load& load, const Model& model, double time);
 
-/// A corner of a triangle under a pressure, and who bears what it takes: on a quadratic face the
-/// middles, which so carry a third of the face each under an even pressure, for a traction puts no
-/// force on its corners.
+/// A corner of a triangle under a pressure, and the nodes that carry its force. On a quadratic face
+/// these are the middles of its edges: an even traction puts a third of the force on each middle
+/// and none on the corners.
 struct PressedCorner {
   Triangle triangle{};
   NodePressure pressure;

@@ -34,22 +34,23 @@ struct Parameters {
   double stiffness_factor = 16;
 
   // ---- iterations
-  /// Newton iterations of one round that is at the end of all ways, then bodies are linearised
-  /// anew; those of a step, then it fails: in time, where halves are quicker, and at rest.
+  /// Newton iterations of one round whose bodies are at the ends of their paths; then bodies are
+  /// linearised again. Iterations of a whole step, then it fails: in time, where halved steps are
+  /// quicker, and at rest.
   int round_iterations = 100;
   std::uint64_t max_iterations = 300, max_iterations_at_rest = 1000;
   int max_rounds = 40; ///< linearisations of bodies that are not linear
   /// Where more rounds than this are still to be expected, bodies are linearised by better models.
   double slow_rounds = 8;
   int gauss_newton = 12; ///< iterations before the projected Hessian takes over
-  /// A step of which collision detection allows less than this part is taken again by a smaller
-  /// part of the way, at most so many times and not below the least part.
+  /// If collision detection allows less than this part of a step, the step is repeated with a
+  /// smaller part of the path: at most so many times, and not below the least part.
   double full_reach = 0.5, least_reach = 1e-4;
   int max_reaches = 3;
   /// Longest step over an edge, by which less of the way is taken.
   double longest_step = 0.25;
-  /// Steps of which collision detection allows less than full_reach are damped, at most so many
-  /// times, by so many times more each time.
+  /// Steps are damped where collision detection allows less than full_reach of them: at most so
+  /// many times, each time by this factor more.
   int max_dampings = 6;
   double damping_factor = 6;
   /// Renewals of friction's lag in one round where forces all but balance, then those between
@@ -71,8 +72,8 @@ struct Parameters {
   double friction_tolerance = 1e-3;
   /// The same, where bodies still are on their ways: what suffices for the next part of them.
   double way_tolerance = 0.2;
-  /// The same, behind which friction takes the normal forces of its limits anew: those that do not
-  /// balance mislead it.
+  /// The same. Below it, friction takes its limits from the present normal forces; forces that do
+  /// not balance would mislead it.
   double lag_tolerance = 5e-3;
   /// Largest last change of a round, over d_hat. Half a thousandth of an edge in its place, where
   /// an instrument makes d_hat small, costs a quarter less, but forces are off by 0.2 %.

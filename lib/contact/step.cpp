@@ -19,7 +19,7 @@ constexpr double armijo = 1e-4;
 constexpr int max_halvings = 40;
 /// Part of a step below which nothing moves any more.
 constexpr double stuck = 1e-12;
-/// Decrement below which an energy cannot be told from rounding.
+/// Decrement below which the change of an energy is lost in rounding.
 constexpr double rounding = 1e-13;
 
 std::string place_text(const Vec3& at) {
@@ -301,7 +301,7 @@ bool StepSolver::Work::lower_energy(CondensedSystem& system, double contact) {
   }
   if (!(step.length <= energy_.step_limit()) || step.free < 1)
     return false;
-  // The energy cannot be told from rounding; forces can.
+  // The energy's change is lost in rounding, that of forces is not.
   try_part(1);
   take(system, step, 1);
   return true;

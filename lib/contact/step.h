@@ -11,7 +11,7 @@
 // tangent planes T are lagged. Newton's method with a line search; no step passes what continuous
 // collision detection allows. Forces are the pairs' own: they sum to zero and never pull.
 //
-// Bodies that are not linear are linearised anew in rounds, until a round changes nothing more.
+// Bodies that are not linear are linearised again in each round, until a round changes nothing.
 
 #include "base/context.h"
 #include "base/error.h"

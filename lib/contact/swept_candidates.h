@@ -24,7 +24,7 @@ public:
   /// to have among vertices(), in any order
   void search(std::span<const Vec3> from, std::span<const Vec3> to, double reach,
               std::span<const std::uint32_t> also);
-  /// Of candidates, and those asked for, ascending.
+  /// Vertices of candidates, and those of `also`, ascending.
   std::span<const std::uint32_t> vertices() const { return vertices_; }
   /// Where the ways began.
   std::span<const Vec3> from() const { return from_; }

@@ -33,9 +33,9 @@ struct SkinCut {
   std::vector<Vec3> end; ///< the sheet's end with the points that the skin has there
 };
 
-/// A sheet that begins with the points of an earlier one's end goes on with its wound. Where walls
-/// of an earlier wound lie on each other, which they do at rest, they are held apart meanwhile by
-/// 1e-6 of `cell`, so that new points in them are so far from where they should be.
+/// A sheet that begins with the points of an earlier one's end goes on with its wound. Walls of an
+/// earlier wound lie on each other at rest. During the cut they are held apart by 1e-6 of `cell`,
+/// so new points in them have this error.
 /// \param cell the size of the sheet's triangles, mm  \param reach mm
 /// \pre check_model passes for the skin's model
 /// \throw Error if the skin is not a surface of one inside where the sheet comes;

@@ -117,7 +117,7 @@ private:
                                                           x_.point[edge.a[1 - k]]};
   }
 
-  /// Which triangles of the sheet are inside, by what hangs together beside the curve.
+  /// Finds the triangles of the sheet that are inside, from the components beside the curve.
   void find_inside() {
     const std::vector<Triangle>& triangles = x_.crossing.b.triangles;
     std::unordered_map<std::uint64_t, std::uint32_t> beside;

@@ -31,7 +31,7 @@ inline Box3 box_of(std::span<const Vec3> points, const Triangle& t) {
   return box;
 }
 
-/// A sheet whose triangles have numbers by what curves enclose: 0, or that of a region.
+/// A sheet whose triangles are numbered by the region that curves enclose: 0 outside of all.
 struct RegionSheet {
   TriangleMesh surface;
   std::vector<std::uint32_t> region, end;

@@ -13,11 +13,11 @@ struct SkinPartsReport {
   std::uint64_t moved = 0; ///< points that follow another element, which is of their part
 };
 
-/// Gives each part (free_parts) its piece of the model's skin. What hangs together as skin though
-/// its elements have come apart, for a blade was not through it yet, is torn between triangles,
-/// each of which goes with most of its points; the openings are closed on both sides alike, by
-/// triangles about their middles. Where a hundredth of its points at most follow elements of
-/// another part, these are taken for lost, and nothing is torn.
+/// Gives each part (free_parts) its piece of the model's skin. Skin can still be connected where
+/// its elements have come apart, because a blade was not through it yet. It is torn between
+/// triangles, and a triangle goes with most of its points. The openings are closed on both sides
+/// alike, by triangles about their middles. Where at most a hundredth of the points follow elements
+/// of another part, these points count as lost, and nothing is torn.
 /// \pre the parts are of this model; its skin is closed where it is torn
 SkinPartsReport part_skin(const Model& model, FreeParts& parts);
 

@@ -20,9 +20,8 @@ struct SkinSheet {
 };
 
 /// A grid in the plane, as wide as the skin is there. Above it is where the normal points. \param
-/// shift of a cell, by which its lines are moved, and a millionth of it along the normal: where
-/// they pass the skin's own edges or points but for rounding, the two meet in no curve that both
-/// can have
+/// shift of a cell, by which its lines are moved, and a millionth of it along the normal: where the
+/// lines pass the skin's own edges or points within rounding, no curve is common to both surfaces
 SkinSheet plane_sheet(const Skin& skin, const CutPlane& plane, double cell, double shift = 0);
 
 /// Between rows of points, one after the other, which need not have as many: what lies between two

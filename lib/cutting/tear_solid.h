@@ -44,12 +44,12 @@ struct SolidTear {
 /// Most elements that a tear takes on besides those at the corners of the one that bears most.
 inline constexpr std::size_t tear_most_elements = 128;
 
-/// The element that bears more than its limit, by the largest share. The plane is across the
-/// direction of its largest principal stress or strain, as that lies in the body at rest, through
-/// the middle of those of its corners that are on the surface, so that a tear goes on from its
-/// front; if none is, or the plane would pass beside the element, of all. The nodes are those of
-/// elements on the plane, at the corners of that one, or that hang together with it and bear more
-/// than their limits, the nearest tear_most_elements.
+/// The element that bears more than its limit, by the largest share. The plane is perpendicular to
+/// the direction of its largest principal stress or strain in the body at rest. It passes the
+/// middle of the element's corners on the surface, so that a tear goes on from its front. If no
+/// corner is on the surface, or the plane would miss the element, it passes the middle of all
+/// corners. The nodes are those of elements on the plane, at the corners of that one, or that hang
+/// together with it and bear more than their limits, the nearest tear_most_elements.
 /// \param attempt 1 and up where nothing came apart there: so many rings of neighbours more, and a
 /// plane through the element's middle, then beside it on either side
 /// \param u displacements of the 3 n axes, mm: in space, with frames of elements; else small ones,

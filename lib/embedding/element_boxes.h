@@ -61,7 +61,7 @@ class ElementBoxes {
 public:
   ElementBoxes(const Model& model, std::span<const std::uint32_t> elements)
       : model_(model), elements_(elements.begin(), elements.end()) {
-    std::ranges::sort(elements_); // of equally near ones the first is wanted
+    std::ranges::sort(elements_); // of equally near ones the first is returned
     std::vector<Box3> boxes(elements_.size());
     for (std::size_t k = 0; k < elements_.size(); ++k)
       for (const Vec3& corner : corners_of(model, elements_[k]))

@@ -8,10 +8,10 @@
 // energy is that of the linear element under E: for 4 nodes
 //   V (mu |F - R|² + lambda/2 tr²(RᵀF - I)),
 // for 10 nodes that of fem/element.h, quadratic functions with the change of volume projected
-// and the bubble eliminated. Forces are the exact derivative of the energy (Chao, Pinkall, Sanan,
-// Schröder, A simple geometric model for elastic deformations, 2010), R's own included, so that
-// they have neither a sum nor a moment, and a step can be judged by the energy. At rest the tangent
-// is solid_stiffness().
+// and the bubble eliminated. Forces are the exact derivative of the energy, R's own included (Chao,
+// Pinkall, Sanan, Schröder, A simple geometric model for elastic deformations, 2010). So they have
+// neither a sum nor a moment, and a step can be judged by the energy. At rest the tangent is
+// solid_stiffness().
 //
 // Damping has the potential 1/2 (E - E0) : C : (E - E0) of the same elements, of strains E0 that
 // remember() keeps: it doesn't act on rotations, and its forces have no moment either.

@@ -1,5 +1,5 @@
 #pragma once
-// The body of corotational_kernel_*.cpp, each of which compiles it for its instruction set.
+// The body of corotational_kernel_*.cpp; each of these files compiles it for one instruction set.
 
 #include "fem/corotational_kernel_internal.h"
 #include "numeric/four_lanes.h"

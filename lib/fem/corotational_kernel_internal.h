@@ -57,9 +57,9 @@ struct CorotationalTask {
   const double* x;                          ///< places of nodes
   const CorotationalPlaces<Nodes>* places;  ///< of the groups
   double* sums;                             ///< added to, as above
-  bool turns;                               ///< wanted
+  bool turns;                               ///< whether they are computed
   const CorotationalStrains<Nodes>* before; ///< of the groups; may be null without damping
-  CorotationalStrains<Nodes>* strains;      ///< of the groups; null: not wanted
+  CorotationalStrains<Nodes>* strains;      ///< of the groups; null: not computed
   CorotationalWeights weights;
 };
 

@@ -38,7 +38,7 @@
 // here.
 //
 // Quadratic elements are integrated by 24 points that are exact to degree 6 (Keast, Moderate-degree
-// tetrahedral quadrature formulas, 1986), as the bubble's stiffness at rest asks.
+// tetrahedral quadrature formulas, 1986), as the bubble's stiffness at rest requires.
 //
 // Units: mm, Pa, forces g mm/s², energies g mm²/s² (1e-9 J).
 
@@ -66,7 +66,7 @@ struct HyperelasticResponse {
   std::array<std::array<Vec3, nodes>, 4> volume_slope{};
 };
 
-/// What of it is wanted; each one costs what stands before it too.
+/// Parts of a response to compute; each includes those before it.
 enum class HyperelasticPart {
   energy,
   force,
@@ -77,7 +77,7 @@ enum class HyperelasticPart {
   positive_tangent
 };
 
-/// Replaces what `response` had of the parts wanted, by the element's law. A classical Neo-Hookean
+/// Replaces the requested parts of `response`, by the element's law. A classical Neo-Hookean
 /// element that is flat or inverted in one of its points has the energy HUGE_VAL, and nothing else
 /// of it is set; so has an element of any law whose energy is too large for a number.
 /// \param own  pressures at the corners as unknowns of their own: force and tangent are those under

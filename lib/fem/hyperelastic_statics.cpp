@@ -107,7 +107,8 @@ public:
           return false;
       }
       if (prescribes) {
-        prescribes = false; // the whole way at once; whoever finds nothing there takes less of it
+        prescribes = false; // the whole displacement at once; the caller takes a part of it where
+                            // no balance is found
         state.displacement = moved(std::move(state.displacement), direction, 1);
       } else if (!go(load, direction, part == HyperelasticPart::tangent, state.displacement)) {
         return false;

@@ -24,8 +24,8 @@ struct SolidModelOptions {
 /// (at the corners, then in the middle) where elements are quadratic.
 /// Masses are those of solid_masses(). A node has the material of the first element that uses it.
 /// No springs, no central nodes. \pre check_mesh(mesh) passes, require_sound() too
-/// \throw Error if the mesh is quadratic and the model isn't wanted so, a middle is away from its
-/// edge's, a material has no Poisson's ratio, or there are too many nodes; Cancelled
+/// \throw Error if the mesh is quadratic and the options are not, a middle is away from its edge's,
+/// a material has no Poisson's ratio, or there are too many nodes; Cancelled
 Model solid_model(TetMesh mesh, const SolidModelOptions& options, const Context& context);
 
 /// The elements of a model as a mesh whose points are its nodes, all of them.

@@ -27,8 +27,8 @@ enum class StrainFrames { resting, turning, elements };
 
 /// Strains under displacements u (mm) of the 3 n axes and gravity (acceleration in mm/s²), without
 /// which the bubbles of a body that its weight deforms would be wrong; at rest in space, 0. Those
-/// of other frames are turned by their rotations, so that they are told in space. \pre elements
-/// are those of the mesh and the materials, u.size() == 3 n
+/// of other frames are turned by their rotations, so that the result is in space. \pre elements are
+/// those of the mesh and the materials, u.size() == 3 n
 std::vector<CornerTensors> solid_strains(const TetMesh& mesh,
                                          std::span<const SolidMaterial> materials,
                                          std::span<const SolidElement> elements,
@@ -51,7 +51,7 @@ std::vector<SymmetricBlock> nodal_tensors(const TetMesh& mesh,
 /// Von Mises's equivalent stress: of a tension alone that tension, of a pressure on all sides 0.
 double von_mises(const SymmetricBlock& stress);
 
-/// What a shape is asked for: in the middle of each element, and means at each node.
+/// Strains and stresses of a shape: in the middle of each element, and means at each node.
 struct SolidFields {
   std::vector<SymmetricBlock> element_strain, node_strain;
   std::vector<SymmetricBlock> element_stress, node_stress; ///< Pa

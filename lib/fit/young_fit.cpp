@@ -21,7 +21,7 @@ namespace {
 constexpr double furthest = 0.1; // of the body's diagonal, that a place may be off it
 constexpr double confidence = 0.95;
 constexpr double unseen = 1e-6; // of displacements, per relative change of a modulus or of nodes
-constexpr double alike = 1e-8;  // of the largest eigenvalue: materials not told apart
+constexpr double alike = 1e-8;  // of the largest eigenvalue: materials that cannot be distinguished
 constexpr double widest = 4;    // factor of a modulus in a round
 
 /// One measured axis of one place.
@@ -115,19 +115,19 @@ double start_factor(const TetMesh& mesh, std::span<const SolidMaterial> material
 class Fit {
 public:
   Fit(const TetMesh& mesh, std::span<const SolidMaterial> materials,
-      std::span<const std::string> names, std::span<const std::size_t> wanted,
+      std::span<const std::string> names, std::span<const std::size_t> sought,
       std::span<const std::uint8_t> fixed, std::span<const MeasuredCase> cases,
       const std::vector<Datum>& data, const Context& context)
-      : mesh_(mesh), materials_(materials.begin(), materials.end()), names_(names), wanted_(wanted),
+      : mesh_(mesh), materials_(materials.begin(), materials.end()), names_(names), sought_(sought),
         fixed_(fixed), cases_(cases), data_(data), context_(context),
-        jacobian_(static_cast<Eigen::Index>(data.size()), static_cast<Eigen::Index>(wanted.size())),
+        jacobian_(static_cast<Eigen::Index>(data.size()), static_cast<Eigen::Index>(sought.size())),
         residual_(static_cast<Eigen::Index>(data.size())) {
     fit_.displacement.resize(cases.size());
     options_.tolerance = 1e-8;
   }
 
   void scale(double factor) {
-    for (const std::size_t m : wanted_)
+    for (const std::size_t m : sought_)
       materials_[m].young *= factor;
   }
 
@@ -142,7 +142,7 @@ public:
               .displacement;
       ++fit_.solves;
       std::vector<SolidVector> changes;
-      for (const std::size_t m : wanted_)
+      for (const std::size_t m : sought_)
         changes.push_back(
             hyperelastic_forces(mesh_, only(elements, m), fit_.displacement[c], context_));
       const auto moves = hyperelastic_response_to(mesh_, elements, fixed_, fit_.displacement[c],
@@ -153,24 +153,24 @@ public:
           continue;
         const auto row = static_cast<Eigen::Index>(k);
         residual_[row] = predicted(d, fit_.displacement[c].axes) - d.value;
-        for (std::size_t p = 0; p < wanted_.size(); ++p)
+        for (std::size_t p = 0; p < sought_.size(); ++p)
           jacobian_(row, static_cast<Eigen::Index>(p)) = -predicted(d, moves[p]); // by log 1/E
       }
     }
   }
 
-  /// Changes the moduli. \return the largest relative change that was wanted
+  /// Changes the moduli. \return the largest relative change, before it is limited
   double improve() {
     require_seen();
     const Eigen::MatrixXd normal = jacobian_.transpose() * jacobian_;
     const Eigen::VectorXd step = normal.ldlt().solve(-jacobian_.transpose() * residual_);
     double change = 0;
-    for (std::size_t p = 0; p < wanted_.size(); ++p) {
+    for (std::size_t p = 0; p < sought_.size(); ++p) {
       const double s = step[static_cast<Eigen::Index>(p)];
       if (!std::isfinite(s))
         throw Error("the rounds of the fit left the numbers");
       change = std::max(change, std::abs(s));
-      materials_[wanted_[p]].young /= std::clamp(1 + s, 1 / widest, widest);
+      materials_[sought_[p]].young /= std::clamp(1 + s, 1 / widest, widest);
     }
     return change;
   }
@@ -178,7 +178,7 @@ public:
   /// What the last solve() and improve() come to.
   YoungFit result() {
     const auto count = static_cast<double>(data_.size());
-    const double freedom = count - static_cast<double>(wanted_.size()),
+    const double freedom = count - static_cast<double>(sought_.size()),
                  variance = freedom > 0 ? residual_.squaredNorm() / freedom : 0;
     fit_.axes = data_.size();
     fit_.residual = std::sqrt(residual_.squaredNorm() / count);
@@ -190,12 +190,12 @@ public:
         (jacobian_.transpose() * jacobian_)
             .ldlt()
             .solve(Eigen::MatrixXd::Identity(jacobian_.cols(), jacobian_.cols()));
-    for (std::size_t p = 0; p < wanted_.size(); ++p) {
-      FittedYoung young{wanted_[p], materials_[wanted_[p]].young, {}};
+    for (std::size_t p = 0; p < sought_.size(); ++p) {
+      FittedYoung young{sought_[p], materials_[sought_[p]].young, {}};
       if (freedom > 0) {
         const auto i = static_cast<Eigen::Index>(p);
         const double width =
-            student_t_quantile((1 - confidence) / 2, data_.size() - wanted_.size()) *
+            student_t_quantile((1 - confidence) / 2, data_.size() - sought_.size()) *
             std::sqrt(variance * inverse(i, i));
         young.interval = {young.young * std::exp(-width), young.young * std::exp(width)};
       }
@@ -261,7 +261,7 @@ private:
     const double square = residual_.squaredNorm();
     const double limit =
         student_t_quantile((1 - confidence) / 2 / static_cast<double>(data_.size()),
-                           data_.size() - wanted_.size() - 1);
+                           data_.size() - sought_.size() - 1);
     double size = 0;
     for (const Datum& d : data_)
       size = std::max(size, std::abs(d.value));
@@ -278,12 +278,12 @@ private:
     }
   }
 
-  std::string name(Eigen::Index p) const { return names_[wanted_[static_cast<std::size_t>(p)]]; }
+  std::string name(Eigen::Index p) const { return names_[sought_[static_cast<std::size_t>(p)]]; }
 
   const TetMesh& mesh_;
   std::vector<SolidMaterial> materials_;
   std::span<const std::string> names_;
-  std::span<const std::size_t> wanted_;
+  std::span<const std::size_t> sought_;
   std::span<const std::uint8_t> fixed_;
   std::span<const MeasuredCase> cases_;
   const std::vector<Datum>& data_;
@@ -297,16 +297,16 @@ private:
 } // namespace
 
 YoungFit fit_young(const TetMesh& mesh, std::span<const SolidMaterial> materials,
-                   std::span<const std::string> names, std::span<const std::size_t> wanted,
+                   std::span<const std::string> names, std::span<const std::size_t> sought,
                    std::span<const std::uint8_t> fixed, std::span<const MeasuredCase> cases,
                    const YoungFitOptions& options, const Context& context) {
   const std::vector<Datum> data = data_of(mesh, fixed, cases);
-  if (wanted.empty())
+  if (sought.empty())
     throw Error("all materials are known, expected one to fit");
-  if (data.size() < wanted.size())
+  if (data.size() < sought.size())
     throw Error(std::to_string(data.size()) + " measured axes for " +
-                std::to_string(wanted.size()) + " materials, expected as many at least");
-  Fit fit(mesh, materials, names, wanted, fixed, cases, data, context);
+                std::to_string(sought.size()) + " materials, expected as many at least");
+  Fit fit(mesh, materials, names, sought, fixed, cases, data, context);
   fit.scale(start_factor(mesh, materials, fixed, cases, data, context));
   // What ends the fit has no place of its own: a wrong measurement is the usual reason.
   const auto naming_worst = [&](auto&& work) {

@@ -33,7 +33,7 @@ namespace gewebe {
 
 /// A displacement of one place.
 struct Measurement {
-  Vec3 place; ///< at rest; off the body it is carried by what is nearest, as find_place() has it
+  Vec3 place; ///< at rest; off the body it follows the nearest element, see find_place()
   std::array<std::optional<double>, 3> displacement; ///< along the axes measured
   std::string name;                                  ///< for messages, such as "line 12"
 };
@@ -67,14 +67,14 @@ struct YoungFitOptions {
   int max_solves = 10;     ///< of all cases
 };
 
-/// \param wanted materials whose modulus is sought; the others keep theirs
-/// \pre solid_elements(mesh, materials) passes, `wanted` are different materials of elements,
+/// \param sought materials whose modulus is found; the others keep theirs
+/// \pre solid_elements(mesh, materials) passes, `sought` are different materials of elements,
 ///      fixed.size() == 3 n   \throw Error naming what is wrong: fewer measured axes than
 /// materials; a measurement off the body by over a tenth of its size, of what is held, or all
-/// against the load; materials on which no measurement depends, or that can't be told apart; rounds
-/// that don't end; as hyperelastic_statics; Cancelled
+/// against the load; materials on which no measurement depends, or that cannot be distinguished;
+/// rounds that don't end; as hyperelastic_statics; Cancelled
 YoungFit fit_young(const TetMesh& mesh, std::span<const SolidMaterial> materials,
-                   std::span<const std::string> names, std::span<const std::size_t> wanted,
+                   std::span<const std::string> names, std::span<const std::size_t> sought,
                    std::span<const std::uint8_t> fixed, std::span<const MeasuredCase> cases,
                    const YoungFitOptions& options = {}, const Context& context = {});
 

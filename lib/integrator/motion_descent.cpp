@@ -39,8 +39,8 @@ constexpr double least_first = 0.2, least_later = 0.3, doubt = 1.25;
 /// The same at rest.
 constexpr double least_at_rest = 0.05;
 
-/// Of a held body's whole displacement: what moves by less in a step is all but at rest, and no
-/// rounds are spent on the digits of so little. What they leave is before the next steps.
+/// Part of the whole displacement of a body with held nodes. A step that moves less than this is
+/// nearly at rest, and no rounds are spent on its digits. The next steps correct the rest.
 constexpr double still_part = 1e-5;
 /// Smallest displacement that errors at rest count against, over that of the start.
 constexpr double rest_part = 1e-6;
@@ -90,7 +90,7 @@ void learn(const MotionPoint& from, const MotionPoint& to, const Way& way, Motio
   way.secants.add(moved, turned, context);
 }
 
-/// What a round that was taken leaves, by what the one before it, or steps before, left.
+/// Estimates the error after a round, from the error before it and from earlier steps.
 void expect(const Way& way, SolidStep& step, double before) {
   const double measured = before < HUGE_VAL ? step.change / before : HUGE_VAL;
   if (way.to_rest) {

@@ -13,7 +13,7 @@ namespace gewebe {
 /// Cancelled
 void descend_quickly(const MotionObjective& objective, MotionPoint& now, MotionQuick& quick,
                      const SolidMotionOptions& options, SolidStep& step, const Context& context);
-/// The same with a tangent, anew as the body moves, until rounding.
+/// The same with a tangent that is computed again as the body moves, until rounding.
 void descend_as_reference(const MotionObjective& objective, MotionPoint& now,
                           MotionTangent& tangent, SolidStep& step, const Context& context);
 

@@ -1,5 +1,5 @@
 #pragma once
-// The body of motion_kernel_*.cpp, each of which compiles it for its instruction set.
+// The body of motion_kernel_*.cpp; each of these files compiles it for one instruction set.
 
 #include "integrator/motion_kernel_internal.h"
 #include "numeric/four_lanes.h"

@@ -72,7 +72,7 @@ Secants::Parts Secants::remove(Numbers& gradient, const Context& context) const 
   return parts;
 }
 
-/// Gives the direction what they say of it, oldest first.
+/// Second loop of L-BFGS: corrects the direction by each pair, oldest first.
 void Secants::restore(const Parts& first, Numbers& direction, const Context& context) const {
   if (count_ == 0)
     return;

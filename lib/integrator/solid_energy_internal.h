@@ -38,7 +38,7 @@ public:
   SolidLaw law() const noexcept { return law_; }
   /// The energy at the places `at`, and that of damping from the strains and lengths kept; -dE/dx
   /// into `forces`. Bubbles of Neo-Hookean elements are where they have least energy.
-  /// `turns`: node_rotations() are wanted.
+  /// `turns`: computes node_rotations() too.
   double evaluate(const Numbers& at, const StepDamping& damping, std::span<double> forces,
                   const Context& context, bool turns = false);
   /// Strains and bubbles of the last evaluation are kept: damping counts from the ones, bubbles

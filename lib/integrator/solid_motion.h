@@ -12,21 +12,22 @@
 // damped. The minimum is sought downhill in this function alone, so that a body that was turned
 // inside out finds back, whatever the tolerance is.
 //
-// The quick way there is a quasi-Newton method with a constant matrix (Liu, Bouaziz, Kavan,
-// Quasi-Newton methods for real-time simulation of hyperelastic materials, ACM TOG 36(3), 2017):
-// the factor of A = M (1/h² + drag/h) + (1 + damping/h) K at rest (linalg/single_factor.h), made
-// once for a step's length and held axes, in frames that turn with each node (Müller, Dorsey,
-// McMillan, Jagnow, Cutler, Stable real-time deformations, 2002), and L-BFGS on top, whose secants
-// stand in the frames, so that those of earlier steps serve on; a step begins where its last ones
-// foretell it. The factor is of all three axes: one by components (n × n, as projective dynamics
-// has) is a ninth of the size but knows no bending. Errors of a step of 1/60 s against the
-// converged one, over its displacement, a beam 100 × 25 × 25 mm of 52,728 tetrahedra, held at an
-// end, falling under its weight, nu = 0.45, E = 50 kPa: 4 rounds by components 100 % on average
-// (the error of earlier steps counts), 2 rounds with this factor 9 %; with E = 5 kPa 0.6 %. With
-// the default tolerance it is below 0.6 % in each step, in 1.9 rounds (2.7 without what earlier
-// steps knew). The reference way has a factor of the tangent where the body is, anew as it moves.
+// The quick way is a quasi-Newton method with a constant matrix (Liu, Bouaziz, Kavan, Quasi-Newton
+// methods for real-time simulation of hyperelastic materials, ACM TOG 36(3), 2017). The matrix is A
+// = M (1/h² + drag/h) + (1 + damping/h) K at rest, factored once for each length of step and set of
+// held axes (linalg/single_factor.h). It is applied in frames that turn with each node (Müller,
+// Dorsey, McMillan, Jagnow, Cutler, Stable real-time deformations, 2002). L-BFGS improves it; its
+// secants are in these frames too, so those of earlier steps remain valid. A step starts from an
+// extrapolation of the last steps. The factor is of all three axes: one by components (n × n, as
+// projective dynamics has) is a ninth of the size but knows no bending. Errors of a step of 1/60 s
+// against the converged one, over its displacement, a beam 100 × 25 × 25 mm of 52,728 tetrahedra,
+// held at an end, falling under its weight, nu = 0.45, E = 50 kPa: 4 rounds by components 100 % on
+// average (the error of earlier steps counts), 2 rounds with this factor 9 %; with E = 5 kPa 0.6 %.
+// With the default tolerance it is below 0.6 % in each step, in 1.9 rounds (2.7 without what
+// earlier steps knew). The reference way factors the tangent at the body's position, again as it
+// moves.
 //
-// A body of which more than a hundredth of the volume is inside out moves without Poisson's ratio
+// If more than a hundredth of a body's volume is inside out, the body moves without Poisson's ratio
 // and without damping by the stiffness until all of its elements are right side out again
 // (integrator/motion_recovery_internal.h; not beside springs, nor by the reference way). 10,000
 // scrambled corotational bodies of up to 162 linear elements, 1,000 of quadratic ones, 1,000 linear
@@ -170,7 +171,8 @@ public:
   /// On by h seconds. Where nothing is held and moved during the step, energy (of motion, of
   /// elements and of the load) doesn't grow: what the nonlinearity or unfinished rounds would add
   /// is taken from the speeds, at last from those of the body as a whole. A body that is held
-  /// nowhere keeps its momentum but for the load's; its angular momentum to first order in h.
+  /// nowhere changes its momentum by the load alone, and keeps its angular momentum to first order
+  /// in h.
   /// \pre h > 0 \throw Error if the state is no longer finite, or as Factor; Cancelled
   SolidStep step(double h, const Context& context);
 
@@ -180,7 +182,8 @@ public:
   /// Another state. \pre 3 n each, finite
   void set_state(std::span<const double> displacement, std::span<const double> velocity,
                  const Context& context = {});
-  /// As set_state, with the places of nodes, as places() and velocity() told them: to the bit.
+  /// As set_state, with the places of nodes, as places() and velocity() returned them: equal to the
+  /// bit.
   void restore(std::span<const double> places, std::span<const double> velocity,
                const Context& context = {});
   /// What earlier steps leave to the next ones, beside places and velocities: secants,
@@ -199,9 +202,9 @@ public:
   // The iterate is a position of all nodes. A part of the step builds the quadratic model
   // 1/2 (x - x_free)^T A (x - x_free) of the step's energy around the iterate, with the constant
   // matrix A in the frames of the iterate, or the tangent there; the caller finds the forces f that
-  // act at x = x_free + A^-1 f, moves there, and asks whether the model holds there. Where it does,
-  // each round lowers the energy of all that takes part (majorisation and minimisation: Hunter,
-  // Lange, A tutorial on MM algorithms, The American Statistician 58(1), 2004).
+  // act at x = x_free + A^-1 f, moves there, and checks whether the model holds there. Where it
+  // does, each round lowers the energy of all that takes part (majorisation and minimisation:
+  // Hunter, Lange, A tutorial on MM algorithms, The American Statistician 58(1), 2004).
 
   /// Begins a step of h, which may be infinite (see settle); the iterate is the present position.
   /// An open step is abandoned without a trace. \pre h > 0, set_load and move_held were called for
@@ -225,17 +228,17 @@ public:
   /// Moves the iterate, from where it was linearised, by (1 - share) step + A^-1 (f - f_0).
   /// \param change  f - f_0, 3 n
   void move_iterate(double share, std::span<const double> change, const Context& context);
-  /// Whether the energy at the iterate is what the model has there, but for half of the model's
-  /// quadratic part; else the next model is of the tangent, or stiffer. The present one stays until
-  /// it is built. \param forces  f, 3 n
+  /// Whether the energy at the iterate is that of the model, within half of the model's quadratic
+  /// part. If not, the next model is of the tangent, or stiffer. The present one stays until it is
+  /// built. \param forces f, 3 n
   bool model_holds(std::span<const double> forces, const Context& context);
   /// Models of this step are of the tangent from now on, where there is one.
   void sharpen();
   /// Whether the last model of the open step was of a tangent.
   bool is_sharp() const noexcept;
   /// Translates the iterate of a body that is held nowhere so that its momentum is that of load and
-  /// forces, where that takes at most `room` mm: the constant matrix moves a strained body not
-  /// quite by what its forces say. At rest it moves to where forces balance. \param forces  f, 3 n
+  /// forces, where that takes at most `room` mm: the constant matrix does not move a strained body
+  /// exactly as its forces would. At rest it moves to where forces balance. \param forces f, 3 n
   /// \return whether the momentum is right, or forces balance within 3e-5 of the displacement
   bool keep_momentum(std::span<const double> forces, double room, const Context& context);
   /// Moves the iterate to where the step ends under the load alone, as step() finds it.

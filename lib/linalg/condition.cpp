@@ -186,7 +186,7 @@ Six rigid_at(const Vec3& position, int axis, const Vec3& center, double size) {
 struct RigidMotions {
   Eigen::VectorXd stiffness;
   Eigen::MatrixXd motions;
-  Eigen::VectorXd share; ///< of a unit displacement that was asked for in each of them
+  Eigen::VectorXd share; ///< of a prescribed unit displacement in each of them
 };
 
 RigidMotions rigid_motions(const Model& model, const StiffnessMatrix& matrix, const Parts& parts,

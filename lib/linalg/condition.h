@@ -30,7 +30,7 @@ public:
 /// Estimate of ‖K⁻¹‖₁, a lower bound that is rarely off by more than a factor of 3 (Hager 1984;
 /// Higham 1988, algorithm 2.4).
 double inverse_norm(const Factor& factor);
-/// The same of a symmetric matrix of order n by what solves with it, y = K⁻¹ x.
+/// The same of a symmetric matrix of order n, given a function that solves y = K⁻¹ x.
 double
 inverse_norm(std::size_t n,
              const std::function<void(std::span<const double> x, std::span<double> y)>& solve);

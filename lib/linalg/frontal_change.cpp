@@ -185,23 +185,23 @@ void FrontalFactor::State::refactor(const Source& k, std::span<const std::uint32
     changed = changed_rows(*k.model, origin, place);
   for (const std::uint32_t row : rows)
     changed[row] = 1;
-  std::vector<char> wanted;
+  std::vector<char> selected;
   if (still_fits(now, place)) {
     graph = std::move(now);
-    wanted.assign(tree.fronts(), 0);
+    selected.assign(tree.fronts(), 0);
     for (std::size_t f = 0; f < tree.fronts(); ++f) {
       for (const std::uint32_t node : tree.eliminated(f))
-        wanted[f] = static_cast<char>(wanted[f] | changed[node]);
-      if (wanted[f] && tree.parent[f] != none)
-        wanted[tree.parent[f]] = 1;
+        selected[f] = static_cast<char>(selected[f] | changed[node]);
+      if (selected[f] && tree.parent[f] != none)
+        selected[tree.parent[f]] = 1;
     }
-    factorise(k, wanted, context);
+    factorise(k, selected, context);
     find_weakest();
   } else {
     const std::vector<std::uint32_t> order = order_for(now, origin, place);
     graph = std::move(now);
-    wanted = grow(order, changed, place);
-    factorise(k, wanted, context);
+    selected = grow(order, changed, place);
+    factorise(k, selected, context);
     lay_out(k);
   }
   remember(k);
@@ -233,7 +233,7 @@ std::vector<char> FrontalFactor::State::grow(std::span<const std::uint32_t> orde
   for (const std::uint32_t parent : before.parent)
     if (parent != none)
       ++had_children[parent];
-  std::vector<char> wanted(tree.fronts(), 0);
+  std::vector<char> selected(tree.fronts(), 0);
   for (std::size_t f = 0; f < tree.fronts(); ++f) {
     const auto own = tree.eliminated(f);
     const std::uint32_t old = front_of[own[0]], parent = tree.parent[f];
@@ -244,16 +244,16 @@ std::vector<char> FrontalFactor::State::grow(std::span<const std::uint32_t> orde
         loads[f] = std::move(carried[old]);
     }
     const bool kept =
-        !wanted[f] && old != none && kept_children[f] == had_children[old] &&
+        !selected[f] && old != none && kept_children[f] == had_children[old] &&
         same(own, before.eliminated(old)) && same(tree.boundary_of(f), before.boundary_of(old)) &&
         std::none_of(own.begin(), own.end(), [&](std::uint32_t i) { return changed[i] != 0; });
-    wanted[f] = !kept;
+    selected[f] = !kept;
     if (parent == none)
       continue;
     kept_children[parent] += kept ? 1 : 0;
-    wanted[parent] = static_cast<char>(wanted[parent] | !kept);
+    selected[parent] = static_cast<char>(selected[parent] | !kept);
   }
-  return wanted;
+  return selected;
 }
 
 } // namespace gewebe

@@ -40,10 +40,10 @@ public:
   FrontalFactor(FrontalFactor&&) noexcept;
   FrontalFactor& operator=(FrontalFactor&&) noexcept;
 
-  /// Goes over to a model that came from the one before: `origin` says of each node which one it
-  /// was, `place` of each one before which it is now, or that it is gone (see CutModel); both may
-  /// be empty where nodes stayed. Equal to a fresh factor with the same tree, bit by bit; where
-  /// nodes are held along other axes than before, it is one.
+  /// Updates the factor to a model that came from the one before. `origin` is the earlier number of
+  /// each node; `place` is the present number of each earlier node, or states that it is gone (see
+  /// CutModel). Both may be empty where nodes stayed. Equal to a fresh factor with the same tree,
+  /// bit by bit; where nodes are held along other axes than before, it is one.
   /// \throw as the constructor; then the factor is of no use
   FrontalWork refactor(const Model& model, std::span<const std::uint32_t> origin,
                        std::span<const std::uint32_t> place, const Context& context);
@@ -83,10 +83,10 @@ public:
   std::array<std::array<double, 3>, 3> compliance(const ForwardSolve& a,
                                                   const ForwardSolve& b) const;
 
-  /// L⁻¹ of a load, kept front by front: where the load or the factor has changed since, the fronts
-  /// that either reaches are solved anew, and the bits are those of all anew. With it, C f at a few
-  /// nodes costs their ways to the root. What is on fixed axes counts for nothing.
-  /// \pre over_axes.size() == axes() \return how many fronts were solved anew
+  /// L⁻¹ of a load, kept front by front. Where the load or the factor has changed since, only the
+  /// fronts that the change reaches are solved again; the bits are those of a full solution. With
+  /// it, C f at a few nodes costs their paths to the root. Loads on fixed axes are ignored.
+  /// \pre over_axes.size() == axes() \return how many fronts were solved
   std::size_t carry(std::span<const double> over_axes);
   /// C f at the axes of a node, of the load carried last. \pre `at` is of this factor, which
   /// carries a load and has not been refactored since

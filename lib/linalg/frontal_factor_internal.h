@@ -82,7 +82,7 @@ struct FrontalFactor::State {
   std::vector<Vec3> position;
   std::vector<std::uint8_t> fixed;
 
-  // L as the solver wants it.
+  // L in the solver's layout.
   FrontBlocks blocks;
   std::vector<const double*> values; // of each block
   std::vector<std::uint32_t> axis_of_row;
@@ -107,8 +107,8 @@ struct FrontalFactor::State {
 
   std::size_t axis_at(const Source& k, std::size_t f, std::size_t row) const;
 
-  /// Computes the fronts that are wanted (all, where that is empty).
-  void factorise(const Source& k, std::span<const char> wanted, const Context& context);
+  /// Computes the fronts f with selected[f] != 0, or all where it is empty.
+  void factorise(const Source& k, std::span<const char> selected, const Context& context);
 
   void lay_out(const Source& k);
 
@@ -123,7 +123,7 @@ struct FrontalFactor::State {
 
   void remember(const Source& k);
 
-  /// All anew, in an order of its own finding.
+  /// Starts again: finds an elimination order and computes all fronts.
   void begin(const Source& k, const Context& context);
   /// Computes all fronts of this tree.
   void begin(const Source& k, FrontTree with, const Context& context);

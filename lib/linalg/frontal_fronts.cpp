@@ -100,7 +100,7 @@ std::size_t FrontalFactor::State::axis_at(const Source& k, std::size_t f, std::s
   return 0;
 }
 
-void FrontalFactor::State::factorise(const Source& k, std::span<const char> wanted,
+void FrontalFactor::State::factorise(const Source& k, std::span<const char> selected,
                                      const Context& context) {
   const std::size_t size = measure_fronts(tree, graph.axes, fronts);
   require_memory(context,
@@ -116,12 +116,12 @@ void FrontalFactor::State::factorise(const Source& k, std::span<const char> want
                               .fronts = fronts,
                               .assemble = [&](const FrontAssembly& to) { assemble(k, to); },
                               .keep_updates = true},
-                             wanted, context);
+                             selected, context);
   } catch (const PivotTooSmall& pivot) {
     throw NotPositiveDefinite(axis_at(k, pivot.front, pivot.column));
   }
   for (std::size_t f = 0; f < loads.size(); ++f)
-    if (wanted.empty() || wanted[f] != 0)
+    if (selected.empty() || selected[f] != 0)
       loads[f].current = false;
 }
 

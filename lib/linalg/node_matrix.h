@@ -1,5 +1,5 @@
 #pragma once
-// A symmetric matrix by its nodes, so that some rows of it can be written anew.
+// A symmetric matrix stored by nodes, so that some of its rows can be replaced.
 
 #include "cholesky/block_graph.h"
 #include "linalg/stiffness.h"

@@ -1,5 +1,5 @@
 #pragma once
-// The body of single_kernel_*.cpp, each of which compiles it for its instruction set.
+// The body of single_kernel_*.cpp; each of these files compiles it for one instruction set.
 
 #include "linalg/single_factor_internal.h"
 

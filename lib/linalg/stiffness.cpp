@@ -71,7 +71,7 @@ void number_axes(const Model& model, std::span<const std::uint8_t> fixed, Stiffn
 
 namespace {
 
-/// \param left_out says of a spring that it makes no entry
+/// \param left_out whether a spring makes no entry
 template <class LeftOut>
 StiffnessMatrix assemble(const Model& model, std::span<const Block> blocks,
                          std::span<const double> added, std::span<const std::uint8_t> fixed,

@@ -1,7 +1,7 @@
 #pragma once
-// The body of supernodal_solve_*.cpp, each of which compiles it for its instruction set. A result
-// is the same bits whatever the width: each unknown sees its subtractions in one fixed order, and
-// there is no fused multiplication.
+// The body of supernodal_solve_*.cpp; each of these files compiles it for one instruction set. A
+// result is the same bits whatever the width: each unknown sees its subtractions in one fixed
+// order, and there is no fused multiplication.
 
 #include "linalg/supernodal_solve_internal.h"
 
@@ -99,7 +99,7 @@ inline Supernode supernode(const SupernodalArrays& a, std::size_t k) {
   return {columns, rows - columns, rows, far, first, a.s + a.pi[k] + columns, l};
 }
 
-inline constexpr std::size_t ahead = 64; ///< how far ahead in a column L is asked for, if far
+inline constexpr std::size_t ahead = 64; ///< how far ahead in a column L is prefetched, if far
 
 /// N rows from `r` on lose what columns [begin, end) contribute; `x` are the supernode's own,
 /// `stride` numbers from one row to the next.
@@ -117,8 +117,8 @@ void lose_columns(const Supernode& n, std::size_t r, std::size_t begin, std::siz
   }
 }
 
-/// N own columns from `c` on, once all before them are solved, of which those before `begin` have
-/// been taken from them.
+/// Solves N own columns from `c` on. \pre all columns before them are solved, and those before
+/// `begin` are subtracted already
 template <class Of, std::size_t N>
 void forward_own(const Supernode& n, std::size_t begin, std::size_t c, double* x,
                  std::size_t stride) {
@@ -147,10 +147,10 @@ void forward_rows(const Supernode& n, std::size_t r, std::size_t begin, std::siz
     sum[i].store(to(r + i));
 }
 
-/// Asks for all of L's block at once where it is small: its columns are short streams, which no
-/// hardware foresees, and one miss after the other would cost several times what memory needs to
-/// deliver them. A large block would be gone again before it is used: there each column is asked
-/// for a little ahead.
+/// Prefetches all of L's block at once where it is small. Its columns are short streams, which no
+/// hardware predicts, and one miss after the other would cost several times what memory needs to
+/// deliver them. A large block would leave the cache before it is used: there each column is
+/// prefetched a little ahead.
 inline void fetch(const Supernode& n) {
   constexpr std::size_t line = 64 / sizeof(double);
   if (n.far)

@@ -2,16 +2,16 @@
 // The surface of a solid from rotations and strains.
 //
 // A small displacement u has at each place a rotation, axial vector curl u / 2, and a strain E.
-// Frames turn by w, that rotation without its short waves; r is what it has beyond w. Taken as
-// large rotations and strains in their frames they ask for the gradient
-// R(w) (I + E + E² / 2 + [r]) of the places; the surface with the nearest gradients is found by a
-// Poisson equation for each axis (Huang, Tong, Zhou, Bao, Desbrun, Interactive shape interpolation
-// through controllable dynamic deformation, IEEE TVCG 17(7), 2011, who do it in the volume). Here
-// it is done on the surface alone: nothing pulls at a free surface, so that its normal stays at
-// right angles and the tilt of the surface is the rotation. Against the same in the volume it
-// changes displacements of a beam bent by 45 degrees by 0.1 % of the largest. Faces are triangles
-// of their corners; middles of quadratic elements' edges stand as far from the middle of the
-// corners as they do under small strains, turned with the triangles at their edge.
+// Frames turn by w, that rotation without its short waves; r is the rotation beyond w. As large
+// rotations and strains in their frames, they prescribe the gradient R(w) (I + E + E² / 2 + [r]) of
+// the places; the surface with the nearest gradients is found by a Poisson equation for each axis
+// (Huang, Tong, Zhou, Bao, Desbrun, Interactive shape interpolation through controllable dynamic
+// deformation, IEEE TVCG 17(7), 2011, in the volume). Here it is done on the surface alone: nothing
+// pulls at a free surface, so that its normal stays at right angles and the tilt of the surface is
+// the rotation. Against the same in the volume it changes displacements of a beam bent by 45
+// degrees by 0.1 % of the largest. Faces are triangles of their corners; middles of quadratic
+// elements' edges stand as far from the middle of the corners as they do under small strains,
+// turned with the triangles at their edge.
 //
 // Differentiated and transposed, the map takes forces on the deformed surface back to forces on the
 // one at rest that do the same work: what a load does in the local frames, lever arms included,

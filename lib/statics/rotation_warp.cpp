@@ -115,7 +115,7 @@ bool any(std::span<const std::uint8_t> flags) {
 
 void WarpColumns::set(std::span<const std::uint32_t> nodes,
                       const std::function<void(std::uint32_t, std::span<double>)>& column_of) {
-  // Ascending, so that sums don't depend on who came when.
+  // Ascending, so that sums do not depend on the order of calls.
   std::vector<std::uint32_t> wanted(nodes.begin(), nodes.end());
   std::ranges::sort(wanted);
   if (wanted == nodes_)
@@ -145,7 +145,7 @@ void WarpColumns::set(std::span<const std::uint32_t> nodes,
   held_columns_.clear();
 }
 
-/// An axis that is fixed gives way to nothing: its row and column are those of the identity.
+/// A fixed axis does not move: its row and column are those of the identity.
 Vector WarpColumns::block_of(std::span<const std::size_t> columns) const {
   const std::size_t size = columns.size();
   Vector block(size * size);
@@ -394,7 +394,7 @@ void RotationWarp::answer(const WarpLoad& load, WarpState& state,
     }
     state.change = size == 0 ? 0 : change / size;
     const double force = largest(part.holding(next));
-    if (holds && force != 0) // of forces less is asked
+    if (holds && force != 0) // forces have a wider tolerance
       state.change = larger(
           state.change,
           fair_force * largest_difference(part.holding(next), part.holding(round.z)) / force);
@@ -416,8 +416,9 @@ void RotationWarp::answer(const WarpLoad& load, WarpState& state,
   }
 }
 
-/// Held nodes go where they must by what is missing in their frames; what holds them follows. (The
-/// other way around, wrong forces of a first round would turn the body.)
+/// Moves held nodes to their places by the displacement that is missing in their frames; the forces
+/// that hold them follow. (The other way around, wrong forces of a first round would turn the
+/// body.)
 void RotationWarp::hold(const WarpLoad& load, const WarpState& state,
                         std::span<const double> missed, std::span<const double> placed,
                         std::span<double> local, std::span<double> holding) const {

@@ -6,10 +6,10 @@
 // displacements v (K v the forces in the local frames) and the shape x(v), what is found makes
 //   ½ vᵀ K v - fᵀ x(v)  stationary:  K v = (dx/dv)ᵀ f,
 // the load turned back into the local frames, where lever arms count as they are on the deformed
-// body. (Turning each force by the rotation of its node alone, as modal warping does - Choi, Ko,
-// Modal warping, IEEE TVCG 11(1), 2005 -, takes the arms of the body at rest.) Under small loads it
-// is the linear answer, which the first round gives. The equation is a fixed point,
-// v <- K⁻¹ (dx/dv)ᵀ f; two or three more rounds do, mixed by Anderson's method.
+// body. (Modal warping takes the arms of the body at rest, since it turns each force by the
+// rotation of its node alone: Choi, Ko, Modal warping, IEEE TVCG 11(1), 2005.) Under small loads it
+// is the linear answer, which the first round gives. The equation is a fixed point, v <- K⁻¹
+// (dx/dv)ᵀ f; two or three more rounds do, mixed by Anderson's method.
 //
 // Against converged Neo-Hookean bodies of the same elements, beam 100 × 30 × 30 held at one end,
 // nu = 0.45, load on the other end, largest error over largest displacement:
@@ -158,14 +158,15 @@ public:
   /// answer, or nothing; the one found behind it
   void answer(const WarpLoad& load, WarpState& state, const WarpOptions& options = {}) const;
 
-  /// How the surface gives way at column nodes that aren't held, by place among them: the change of
-  /// their 3 m displacements for their 3 m forces, held ones held, near a state; symmetric.
+  /// Compliance of the surface at column nodes that are not held, by place among them: the change
+  /// of their 3 m displacements for their 3 m forces near a state, while held nodes stay.
+  /// Symmetric.
   std::vector<double> compliance_at(const WarpLoad& load, const WarpState& state,
                                     std::span<const std::size_t> places) const;
 
-  /// The displacements of small strains on all 3 n axes, of which a state's `local` is the surface,
-  /// by one solution with K's factor; and the body's displacements, inside too, where what turning
-  /// adds goes on harmonically from the surface.
+  /// whole_local: the displacements of small strains on all 3 n axes, by one solution with K's
+  /// factor; a state's `local` is their part on the surface. whole_shape: the body's displacements,
+  /// inside too, where the part that rotations add is continued harmonically from the surface.
   std::vector<double> whole_local(const WarpLoad& load, const WarpState& state) const;
   std::vector<double> whole_shape(const WarpState& state,
                                   std::span<const double> whole_local) const;

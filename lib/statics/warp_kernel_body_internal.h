@@ -1,5 +1,5 @@
 #pragma once
-// The body of warp_kernel_*.cpp, each of which compiles it for its instruction set.
+// The body of warp_kernel_*.cpp; each of these files compiles it for one instruction set.
 
 #include "numeric/four_lanes.h"
 #include "statics/warp_kernel_internal.h"

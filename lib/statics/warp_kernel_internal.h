@@ -29,8 +29,8 @@ struct WarpKernel {
   void (*find_rotations)(const TriangleGroup* groups, std::size_t count, const double* local,
                          double* w);
   /// Adds area (R (I + E + E² / 2 + [r]) - I) ∇N to the nodes of each triangle, in frames that are
-  /// turned by w, r the rotation beyond that: what asks the surface to become what `local` stands
-  /// for.
+  /// turned by w, r the rotation beyond that. It is the divergence of the gradients that `local`
+  /// prescribes for the surface.
   void (*ask)(const TriangleGroup* groups, std::size_t count, const double* local, const double* w,
               double* divergence);
   /// Middles of edges whose ends are displaced by u: as far from the middle of those as in `local`,

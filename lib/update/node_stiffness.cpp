@@ -150,7 +150,7 @@ void update_node_stiffness(NodeMatrix& matrix, const Model& model,
   next.block = std::move(matrix.block);
   next.diagonal = std::move(matrix.diagonal);
   next.diagonal.resize(model.nodes.size());
-  // Blocks of rows that were written anew stay behind until there are too many.
+  // Old blocks of rows that were replaced stay in memory until there are too many.
   if (next.block.size() > 2 * matrix.node.size()) {
     std::vector<std::array<double, 9>> kept;
     kept.reserve(next.block.size() / 2);

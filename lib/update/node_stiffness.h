@@ -14,8 +14,8 @@ namespace gewebe {
 /// \throw Error as solid_elements
 NodeMatrix node_stiffness(const Model& model);
 
-/// Goes over to a model with more nodes, or as many: rows of these are written anew, all others
-/// are as they were. Equal to node_stiffness(model), to the bit, but for the order of blocks.
+/// Updates the matrix to a model with as many nodes, or more: these rows are replaced, all others
+/// stay. Equal to node_stiffness(model), to the bit, except for the order of blocks.
 /// \param rows ascending: nodes of elements that are others than before, all new ones among them
 void update_node_stiffness(NodeMatrix& matrix, const Model& model,
                            std::span<const std::uint32_t> rows);

@@ -1,6 +1,6 @@
 #pragma once
-// The OpenVDB grid behind a Grid; for volume/grid.cpp, grid_fold.cpp and
-// formats/volume/volume_file.cpp only.
+// Implementation of Grid by an OpenVDB tree. Only volume/grid.cpp, grid_fold.cpp and
+// formats/volume/volume_file.cpp include this header.
 
 #include "base/zero_pages.h"
 #include "volume/grid.h"
@@ -17,14 +17,15 @@ namespace gewebe {
 
 using FloatTree = openvdb::FloatTree;
 
-/// Memory that leaves of a tree borrow their values from.
+/// Memory that holds values of a tree's leaves.
 struct LeafStorage {
   std::vector<ZeroPages> pages;
   std::vector<std::shared_ptr<const void>> lenders; ///< owners of shared values
 };
 
-/// Leaves that borrow their values are marked (transientData) and let go of them before the tree
-/// dies, so nothing may delete or steal such a leaf behind its back; copying is safe.
+/// State of a Grid. Leaves can borrow their values from `storage`. Such leaves are marked
+/// (transientData) and give their values back before the tree is destroyed. So no other code may
+/// delete a borrowing leaf or move it to another tree; to copy it is safe.
 struct Grid::Native {
   FloatTree::Ptr tree; ///< from make_tree
   std::shared_ptr<LeafStorage> storage;
