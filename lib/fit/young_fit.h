@@ -17,7 +17,7 @@
 
 #include "base/context.h"
 #include "fem/assembly.h"
-#include "fem/hyperelastic_statics.h"
+#include "fit/hyperelastic_statics.h"
 #include "geometry/vec3.h"
 #include "tetrahedra/tet_mesh.h"
 

@@ -6,7 +6,7 @@
 #include "fem/assembly.h"
 #include "fem/hyperelastic.h"
 #include "fem/hyperelastic_kernel_internal.h"
-#include "fem/hyperelastic_statics.h"
+#include "fit/hyperelastic_statics.h"
 #include "hyperelastic_laws.h"
 #include "linalg/factor.h"
 #include "tests/unit/larger.h"

@@ -3,7 +3,7 @@
 
 #include "fem/assembly.h"
 #include "fem/hyperelastic.h"
-#include "fem/hyperelastic_statics.h"
+#include "fit/hyperelastic_statics.h"
 #include "hyperelastic_laws.h"
 #include "integrator/solid_motion.h"
 #include "tests/unit/larger.h"

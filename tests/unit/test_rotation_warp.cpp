@@ -3,7 +3,7 @@
 
 #include "base/error.h"
 #include "fem/assembly.h"
-#include "fem/hyperelastic_statics.h"
+#include "fit/hyperelastic_statics.h"
 #include "linalg/factor.h"
 #include "statics/rotation_strain.h"
 #include "statics/rotation_warp.h"

@@ -1,7 +1,7 @@
 // Solids in motion: what mechanics says of them (energy, momentum, rest, order), that they find
 // back from any shape, and a measured beam's frequency.
 
-#include "fem/hyperelastic_statics.h"
+#include "fit/hyperelastic_statics.h"
 #include "geometry/vector_at.h"
 #include "integrator/motion_limit_internal.h"
 #include "integrator/motion_volumes_internal.h"

@@ -1,7 +1,7 @@
 // Solids at rest under large strains, by the step of infinite length: closed forms of uniaxial
 // stretch and simple shear, an independent Newton's method, first order under small loads.
 
-#include "fem/hyperelastic_statics.h"
+#include "fit/hyperelastic_statics.h"
 #include "integrator/solid_motion.h"
 #include "linalg/factor.h"
 #include "tests/unit/larger.h"

@@ -3,10 +3,10 @@
 
 #include "base/error.h"
 #include "contact_checks.h"
-#include "fem/hyperelastic_statics.h"
 #include "fem/model_stiffness.h"
 #include "fem/solid_model.h"
 #include "fem/stress.h"
+#include "fit/hyperelastic_statics.h"
 #include "geometry/vector_at.h"
 #include "larger.h"
 #include "scene/simulation.h"

@@ -1,6 +1,6 @@
 // Against an experiment: a silicone beam.
 
-#include "fem/hyperelastic_statics.h"
+#include "fit/hyperelastic_statics.h"
 #include "linalg/factor.h"
 #include "statics/rotation_warp.h"
 #include "tests/bench/timing.h"

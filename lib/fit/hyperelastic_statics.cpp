@@ -1,4 +1,4 @@
-#include "fem/hyperelastic_statics.h"
+#include "fit/hyperelastic_statics.h"
 
 #include "base/error.h"
 #include "base/parallel.h"
