@@ -2,7 +2,7 @@
 // Young's moduli of a solid from loads and the displacements that they were measured to cause.
 //
 // Displacements are those of a stable Neo-Hookean solid at rest under each load
-// (fem/hyperelastic_statics.h), so that they may be large; Poisson's ratios and densities are
+// (fit/hyperelastic_statics.h), so that they may be large; Poisson's ratios and densities are
 // taken as they are. Sought is the least sum of squared differences to what was measured, over the
 // compliance 1/E of each material, by Gauss and Newton's method with exact derivatives:
 // K_T du/dlog E = f, f the forces of the material's elements at the balance. Under dead loads and

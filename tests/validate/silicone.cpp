@@ -89,7 +89,7 @@ Section silicone() {
       "upper edge of the other. The figures are the droops of three markers, 6 mm off the edges "
       "and sides of the free end. E = 263,824 Pa was fitted to the motion of the same beam by the "
       "authors of the measurement; ν = 0.499. Small strains neglect rotation and have a bound "
-      "under weight alone. A Neo-Hookean solid (`lib/fem/hyperelastic_statics.h`) and the linear "
+      "under weight alone. A Neo-Hookean solid (`lib/fit/hyperelastic_statics.h`) and the linear "
       "solid with large rotations (`lib/statics/rotation_warp.h`, `rotation=warp` of ffe-run) "
       "rotate; the latter has E = 270,000 Pa, which fits the droops of both recordings. The "
       "reference is the mean of two trials, which differ by up to 2.2 %.",
