@@ -91,7 +91,7 @@ public:
     }
     if (legacy_.points.empty())
       fail("the file ends without POINTS, expected them");
-    if (legacy_.grid && legacy_.cells.size() == 0)
+    if (legacy_.grid && !has_cells_)
       fail("the file ends without CELLS, expected them");
     if (legacy_.grid && legacy_.types.size() != legacy_.cells.size())
       fail(std::to_string(legacy_.types.size()) + " CELL_TYPES, expected " +
@@ -280,8 +280,10 @@ private:
         fail(std::to_string(tuples_) + " tuples, expected " + std::to_string(expected));
       return;
     }
-    if (legacy_.grid && keyword == "cells")
+    if (legacy_.grid && keyword == "cells") {
+      has_cells_ = true;
       return read_cells(legacy_.cells);
+    }
     if (legacy_.grid && keyword == "cell_types") {
       legacy_.types = integers(count("the number of types"), Type::integer32);
       return;
@@ -449,7 +451,7 @@ private:
   std::string_view bytes_;
   const std::string& name_;
   std::size_t at_ = 0, last_ = 0;
-  bool binary_ = false, of_cells_ = false;
+  bool binary_ = false, of_cells_ = false, has_cells_ = false;
   std::uint64_t tuples_ = 0;
   Legacy legacy_;
 };

@@ -10,6 +10,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cstddef>
 #include <cstdint>
 #include <random>
@@ -222,7 +223,7 @@ TEST(Vtp, HugeClaimsCostNothing) {
 TEST(Vtp, IsAKindOfMesh) {
   EXPECT_EQ(kind_from_suffix("a.VTP"), Kind::vtp);
   EXPECT_EQ(kind_from_name("vtp"), Kind::vtp);
-  EXPECT_EQ(readable_mesh_kinds().back(), Kind::vtp);
+  EXPECT_EQ(std::ranges::count(readable_mesh_kinds(), Kind::vtp), 1);
 }
 
 } // namespace
