@@ -240,9 +240,9 @@ test_a_suffix_of_nobody_is_wrong_use() {
   for tool in $(programs); do
     sample "$tool"
     expect_failure 2 "$tool" "${words[@]}" -o out.jpg
-    expect_failure 2 "$tool" "${words[@]}" -o out.mp4
+    expect_failure 2 "$tool" "${words[@]}" -o out.mkv
     expect_failure 2 "$tool" "${words[@]}" -o out.3mf
-    [[ ! -e out.jpg && ! -e out.mp4 && ! -e out.3mf ]] || fail "$tool wrote it"
+    [[ ! -e out.jpg && ! -e out.mkv && ! -e out.3mf ]] || fail "$tool wrote it"
   done
 }
 
