@@ -235,11 +235,12 @@ const Stencil& stencil(const std::array<int, 4>& signs, const DiagonalOrder& ord
   return table[number(signs, answers(signs, order), 8)];
 }
 
-double least_angle_cosine(const std::array<Vec3, 4>& p) {
+double least_angle_cosine(const std::array<Vec3, 4>& corners) {
   std::array<Vec3, 4> normals;
   for (std::size_t f = 0; f < 4; ++f) {
     const auto& face = tetrahedron_faces[f];
-    const Vec3 normal = cross(p[face[1]] - p[face[0]], p[face[2]] - p[face[0]]);
+    const Vec3 normal =
+        cross(corners[face[1]] - corners[face[0]], corners[face[2]] - corners[face[0]]);
     normals[f] = normal / norm(normal);
   }
   double largest = -1;
