@@ -65,7 +65,8 @@ inline void add_tangent(const TangentPoint& q, std::size_t count, TangentSums& s
 }
 
 /// The node between two corners.
-inline constexpr std::size_t middle_of[4][4] = {{0, 4, 6, 7}, {4, 0, 5, 8}, {6, 5, 0, 9}, {7, 8, 9, 0}};
+inline constexpr std::size_t middle_of[4][4] = {
+    {0, 4, 6, 7}, {4, 0, 5, 8}, {6, 5, 0, 9}, {7, 8, 9, 0}};
 
 /// What is known of a group's points.
 struct GroupPoints {
