@@ -27,14 +27,7 @@ public:
 
 private:
   void take_corners(const char* what, std::size_t cell, std::span<const std::int64_t> nodes) {
-    const auto fail = [&](const std::string& problem) {
-      throw Error(name_, what + std::to_string(cell) + ": " + problem);
-    };
-    if (nodes.size() < 3)
-      fail(std::to_string(nodes.size()) + " points, expected 3 or more");
-    corners_.clear();
-    for (const std::int64_t node : nodes)
-      corners_.push_back(vtk::node_number(node, mesh_.points.size(), fail));
+    vtk::take_corners(name_, what + std::to_string(cell), nodes, mesh_.points.size(), corners_);
   }
 
   void add(const Triangle& triangle, std::size_t cell) {

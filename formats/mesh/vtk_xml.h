@@ -2,6 +2,7 @@
 // Files of VTK in XML with one piece: .vtu and .vtp. Its XML is that which VTK's writers make:
 // elements with attributes, comments, declarations, no entities.
 
+#include "base/error.h"
 #include "formats/mesh/vtk_numbers.h"
 #include "geometry/vec3.h"
 
@@ -72,6 +73,19 @@ std::uint32_t node_number(std::int64_t node, std::uint64_t points, const Fail& f
   if (node < 0 || static_cast<std::uint64_t>(node) >= points)
     fail("point " + std::to_string(node) + ", expected 0 to below " + std::to_string(points));
   return static_cast<std::uint32_t>(node);
+}
+
+/// Takes the corners of a cell of three or more points. \param place  of the cell, for messages
+/// \throw Error of a file of this name if they are fewer, or a point is not below `points`
+inline void take_corners(const std::string& name, const std::string& place,
+                         std::span<const std::int64_t> nodes, std::uint64_t points,
+                         std::vector<std::uint32_t>& corners) {
+  const auto fail = [&](const std::string& problem) { throw Error(name, place + ": " + problem); };
+  if (nodes.size() < 3)
+    fail(std::to_string(nodes.size()) + " points, expected 3 or more");
+  corners.clear();
+  for (const std::int64_t node : nodes)
+    corners.push_back(node_number(node, points, fail));
 }
 
 } // namespace gewebe::vtk

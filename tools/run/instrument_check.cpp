@@ -93,7 +93,8 @@ void InstrumentCheck::look(const Simulation& simulation,
     const auto middle = below->edges.begin() + static_cast<std::ptrdiff_t>(below->edges.size() / 2);
     std::ranges::nth_element(below->edges, middle);
     const double radius = report.shape.radius;
-    if (!(radius < edges_in_radius * *middle))
+    // What it touches may be a net, and the solid far away.
+    if (!(below->distance <= *middle) || !(radius < edges_in_radius * *middle))
       continue;
     warn(
         "instrument " + report.name + " at " + number_text(simulation.time()) +
