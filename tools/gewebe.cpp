@@ -6,6 +6,7 @@
 #include "tools/cli/messages.h"
 #include "tools/cli/tool_list.h"
 #include "tools/cli/version.h"
+#include "tools/plot/plot_command.h"
 
 #include <algorithm>
 #include <cerrno>
@@ -26,6 +27,7 @@ namespace fs = std::filesystem;
 
 constexpr std::string_view usage = R"(Starts the programs of Gewebe.
 Usage: gewebe PROGRAM [ARGUMENT...]
+       gewebe plot --y NAME,... [OPTION...] [TABLE]
        gewebe help [PAGE]
        gewebe --list | --help | --version
 
@@ -112,7 +114,7 @@ void work(const std::vector<std::string>& words) {
     return write_text(tool_list());
   if (word == "--version")
     return write_text(cli::version_text("gewebe"));
-  std::vector<std::string> known{"help", "--help", "--list", "--version"};
+  std::vector<std::string> known{"plot", "help", "--help", "--list", "--version"};
   std::ranges::copy(tool_names(), std::back_inserter(known));
   throw UsageError("no program '" + word + "'" + suggestion(word, known) + ", see gewebe --list");
 }
@@ -120,6 +122,8 @@ void work(const std::vector<std::string>& words) {
 } // namespace
 
 int main(int argc, char** argv) {
+  if (argc > 1 && std::string_view(argv[1]) == "plot")
+    return run_plot(argc - 1, argv + 1);
   try {
     work({argv, argv + argc});
     return 0;

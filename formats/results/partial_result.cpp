@@ -72,8 +72,14 @@ std::vector<Leftover> leftovers_of(const std::string& target) {
   return found;
 }
 
-/// Cuts a table of forces off behind its last whole frame, see Output::append_whole.
-PartialFrames cut_table(const Leftover& left) {
+/// Frames of a table, whose rows are frames or nodes.
+struct PartialTable {
+  PartialFrames there;
+  bool of_nodes = false;
+};
+
+/// Cuts a table off behind its last whole frame, see Output::append_whole.
+PartialTable cut_table(const Leftover& left) {
   std::string text;
   std::vector<char> block(1U << 20U);
   for (ssize_t count = 0; (count = ::read(left.lock.get(), block.data(), block.size())) > 0;)
@@ -81,15 +87,16 @@ PartialFrames cut_table(const Leftover& left) {
   text.resize(std::min(text.find('\0'), text.size()));
   if (::ftruncate(left.lock.get(), static_cast<off_t>(text.size())) != 0)
     throw Error(left.path, std::string("cannot write: ") + std::strerror(errno));
-  PartialFrames there;
+  PartialTable table{{}, text.starts_with("time,object,")};
+  PartialFrames& there = table.there;
   for (std::size_t line = text.find('\n') + 1, end = 0; line < text.size(); line = end + 1) {
     end = std::min(text.find('\n', line), text.size());
     double time = 0;
     if (std::from_chars(text.data() + line, text.data() + end, time).ec == std::errc() &&
-        (there.frames == 0 || time != there.time))
+        (!table.of_nodes || there.frames == 0 || time != there.time))
       there = {there.frames + 1, time};
   }
-  return there;
+  return table;
 }
 
 bool is_hdf5(const Leftover& left) {
@@ -144,16 +151,17 @@ KeptResult recover_result(const std::string& path) {
     if (!is_hdf5(left) && !target.ends_with(".csv"))
       continue;
     const bool table = !is_hdf5(left);
-    PartialFrames there;
+    PartialTable found;
     try {
-      there = table ? cut_table(left) : mark_partial(left.path, "killed");
+      found = table ? cut_table(left) : PartialTable{mark_partial(left.path, "killed")};
     } catch (const Error&) {
       continue; // killed before its first frame
     }
+    const PartialFrames& there = found.there;
     if (there.frames == 0)
       continue;
-    KeptResult kept{(table ? "forces of " : "") + frames_text(there.frames), there.time, true, "",
-                    partial_name(target)};
+    KeptResult kept{(found.of_nodes ? "forces of " : "") + frames_text(there.frames), there.time,
+                    true, "", partial_name(target)};
     if (::rename(left.path.c_str(), kept.file.c_str()) != 0)
       throw Error(kept.file, std::string("cannot rename: ") + std::strerror(errno));
     if (!table)

@@ -4,6 +4,7 @@
 #include "embedding/skin.h"
 #include "formats/results/instrument_sets_internal.h"
 #include "formats/results/partial_result.h"
+#include "formats/results/results_csv.h"
 #include "formats/results/results_mesh.h"
 #include "formats/results/results_vtkhdf.h"
 #include "formats/results/results_vtu.h"
@@ -14,6 +15,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numeric>
 #include <optional>
 
@@ -97,6 +99,33 @@ private:
     for (const SymmetricBlock& stress : stresses)
       values.push_back(gewebe::von_mises(stress));
     to.append(std::span<const float>(in_single(values, "a stress", " Pa")));
+  }
+};
+
+/// Estimated errors of an object over time.
+struct EstimateSets {
+  hdf5::Dataset relative, force, displacement, stress;
+
+  EstimateSets(hdf5::Group group, std::uint64_t from)
+      : relative(numbers(group, "relative")), force(numbers(group, "force")),
+        displacement(numbers(group, "displacement")), stress(numbers(group, "stress")) {
+    group.set("first_frame", from);
+  }
+
+  void append(const std::optional<DiscretisationError>& error) {
+    constexpr double none = std::numeric_limits<double>::quiet_NaN();
+    add(relative, error ? error->relative : none);
+    add(force, error ? error->force : none);
+    add(displacement, error ? error->displacement : none);
+    add(stress, error ? error->stress : none);
+  }
+
+private:
+  static hdf5::Dataset numbers(hdf5::Group& group, const char* name) {
+    return group.create_growing(name, hdf5::Number::float64, {}, 256);
+  }
+  static void add(hdf5::Dataset& to, double value) {
+    to.append(std::span<const double>(&value, 1));
   }
 };
 
@@ -188,6 +217,11 @@ public:
             to.fields->show_row(*to.views, to.fields->stress.rows() - 1);
         }
         xdmf_bytes_ += xdmf_bytes(output_.name(), to.name, objects[i].fields != nullptr);
+        if (objects[i].estimate) {
+          if (!to.estimates)
+            to.estimates.emplace(to.group.create_group("estimates"), frames_);
+          to.estimates->append(*objects[i].estimate);
+        }
         const std::span<const NodeVector> forces = objects[i].forces;
         if (forces.empty())
           continue;
@@ -241,6 +275,7 @@ private:
     std::uint64_t shapes = 1;                     ///< that it had, one after the other
     std::optional<hdf5::Group> cuts, shape_group; ///< and, of one that was cut, of its last shape
     std::optional<FieldSets> fields;
+    std::optional<EstimateSets> estimates;
     std::optional<hdf5::Group> views; ///< of the last shape's frames, while the object is alone
   };
 
@@ -262,7 +297,7 @@ private:
     hdf5::Dataset force = forces.create_growing("force", hdf5::Number::float64, {3}, 512);
     objects_.push_back({name, std::move(group), std::move(displacement), std::move(frame),
                         std::move(node), std::move(force), 1, std::nullopt, std::nullopt,
-                        std::nullopt, std::nullopt});
+                        std::nullopt, std::nullopt, std::nullopt});
     Object& object = objects_.back();
     if (stands_alone())
       object.views.emplace(object.group.create_group("frames"));
@@ -400,50 +435,6 @@ private:
   std::uint64_t xdmf_bytes_ = 0, xdmf_reserved_ = 0; ///< of the text so far, at most
 };
 
-// ---- forces
-
-class ForceTable final : public ResultWriter {
-public:
-  ForceTable(const std::string& path, const Output::Options& options) : output_(path, options) {
-    output_.write("time,object,node,fx,fy,fz\n");
-  }
-
-  bool wants_models() const override { return false; }
-
-  void add_object(const std::string& name, const Model& /*model*/) override {
-    names_.push_back(name);
-  }
-
-  void add_frame(double time, std::span<const FrameObject> objects) override {
-    const std::string start = number_text(time) + ",";
-    std::string rows;
-    for (std::size_t i = 0; i < objects.size(); ++i)
-      for (const NodeVector& f : objects[i].forces)
-        rows += start + names_[i] + "," + std::to_string(f.node) + "," + number_text(f.value.x) +
-                "," + number_text(f.value.y) + "," + number_text(f.value.z) + "\n";
-    output_.append_whole(rows);
-    ++frames_;
-    time_ = time;
-  }
-
-  void commit() override { output_.commit(); }
-
-  void outlive_signals() override { output_.outlive_signals(); }
-
-  std::optional<KeptResult> keep_partial(const std::string& /*why*/) override {
-    if (frames_ < 2 || !output_.has_temporary())
-      return std::nullopt;
-    return KeptResult{"forces of " + frames_text(frames_), time_, true, "",
-                      output_.commit_partial()};
-  }
-
-private:
-  Output output_;
-  std::uint64_t frames_ = 0;
-  double time_ = 0;
-  std::vector<std::string> names_;
-};
-
 } // namespace
 
 const std::vector<Kind>& result_kinds() {
@@ -453,7 +444,7 @@ const std::vector<Kind>& result_kinds() {
 }
 
 std::unique_ptr<ResultWriter> open_result(Kind kind, const std::string& path,
-                                          const Output::Options& options) {
+                                          const Output::Options& options, TableRows rows) {
   switch (kind) {
   case Kind::hdf5:
     return std::make_unique<Hdf5Result>(path, options);
@@ -462,7 +453,7 @@ std::unique_ptr<ResultWriter> open_result(Kind kind, const std::string& path,
   case Kind::vtkhdf:
     return open_vtkhdf_result(path, options);
   case Kind::csv:
-    return std::make_unique<ForceTable>(path, options);
+    return open_csv_result(path, options, rows);
   default:
     return open_mesh_result(kind, path, options);
   }

@@ -1,10 +1,11 @@
 #pragma once
 // What a run leaves: gewebe_results(5). HDF5 with an XDMF beside it, the last shape or every
-// shape as a mesh, or the contact forces as CSV.
+// shape as a mesh, or curves and forces as CSV.
 
 #include "contact/instrument.h"
 #include "contact/load.h"
 #include "fem/stress.h"
+#include "fem/stress_error.h"
 #include "formats/stream/kind.h"
 #include "formats/stream/stream.h"
 #include "model/model.h"
@@ -26,6 +27,17 @@ struct FrameObject {
   std::span<const NodeVector> forces;   ///< at displaced nodes
   /// Stresses of a solid, if requested: from one frame on in all.
   const SolidFields* fields = nullptr;
+  /// Errors of its mesh, if requested; an empty one: they can't be estimated.
+  const std::optional<DiscretisationError>* estimate = nullptr;
+  /// mm, of a node, if a curve is to have it.
+  std::optional<double> largest_displacement{};
+};
+
+/// The springs that attach one object to another, in one frame.
+struct FrameAttachment {
+  std::string_view name, other;
+  std::uint64_t springs = 0;
+  Vec3 force; ///< of all springs on the first object, 1e-6 N
 };
 
 /// An instrument in one frame.
@@ -60,6 +72,8 @@ public:
 
   /// Whether it writes shapes; else models may be empty, and displacements too.
   virtual bool wants_models() const { return true; }
+  /// Whether it writes numbers over time: largest displacements and attachments.
+  virtual bool wants_curves() const { return false; }
   /// An object that is in all frames to come; in those before it was at rest. Names differ and need
   /// no quoting.
   virtual void add_object(const std::string& name, const Model& model) = 0;
@@ -73,6 +87,8 @@ public:
   /// All instruments, in an order that stays, as they are in the next frame alone. Ignored by
   /// writers without instruments.
   virtual void set_instruments(std::span<const FrameInstrument> /*instruments*/) {}
+  /// All attachments in the next frame alone. Ignored by writers without curves.
+  virtual void set_attachments(std::span<const FrameAttachment> /*attachments*/) {}
   /// \pre as many objects as were added, in their order
   virtual void add_frame(double time, std::span<const FrameObject> objects) = 0;
   /// Nothing appears without it, except the files of a series. \throw Error
@@ -91,10 +107,14 @@ public:
 /// The kinds that there are: h5, ply, obj, vtu, vtkhdf, csv.
 const std::vector<Kind>& result_kinds();
 
+/// What the rows of a CSV are: frames with all their numbers, or displaced and touched nodes.
+enum class TableRows { frame, node };
+
 /// A ply, obj or vtu whose path holds a pattern, %d or %04d, is a series: one file for each frame.
 /// \throw Error, UsageError as Output; h5 and vtkhdf need a file, and h5 writes PATH with
 /// suffix .xdmf beside it
 std::unique_ptr<ResultWriter> open_result(Kind kind, const std::string& path,
-                                          const Output::Options& options);
+                                          const Output::Options& options,
+                                          TableRows rows = TableRows::frame);
 
 } // namespace gewebe

@@ -2,6 +2,7 @@
 // What a scene answers to a step, as text: gewebe_serve(5).
 
 #include "fem/stress.h"
+#include "fem/stress_error.h"
 #include "scene/simulation.h"
 
 #include <cstddef>
@@ -25,14 +26,6 @@ struct StressAnswer {
   std::size_t object = 0;
   std::span<const std::uint32_t> nodes;   ///< ascending
   std::span<const SymmetricBlock> stress; ///< of all nodes of the object, Pa
-};
-
-/// What mesh and order of the elements cause, estimated: gewebe_serve(5).
-struct DiscretisationError {
-  double relative = 0;     ///< of the energy, and so of forces and displacements
-  double force = 0;        ///< of the sum of forces at displaced and touched nodes, 1e-6 N
-  double displacement = 0; ///< of the largest displacement of another node, mm
-  double stress = 0;       ///< at the node of the largest von Mises stress, Pa
 };
 
 /// Answer of --estimate for an object; none where errors can't be estimated.

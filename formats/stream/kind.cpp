@@ -10,7 +10,7 @@
 namespace gewebe {
 namespace {
 
-constexpr std::array<std::pair<Kind, std::string_view>, 32> names{{
+constexpr std::array<std::pair<Kind, std::string_view>, 34> names{{
     {Kind::particles, "particles"},
     {Kind::vdb, "vdb"},
     {Kind::ply, "ply"},
@@ -43,6 +43,8 @@ constexpr std::array<std::pair<Kind, std::string_view>, 32> names{{
     {Kind::feb, "feb"},
     {Kind::mp4, "mp4"},
     {Kind::webm, "webm"},
+    {Kind::svg, "svg"},
+    {Kind::ascii, "ascii"},
 }};
 
 /// The suffix of a path that names a kind, though none of ours: up to five letters and digits, not
@@ -147,7 +149,8 @@ Kind kind_from_suffix(std::string_view path) {
     return Kind::medit;
   if (suffix == "node" || suffix == "ele")
     return Kind::tetgen;
-  if (suffix == "txt" || suffix == "msh4" || suffix == "medit" || suffix == "tetgen")
+  if (suffix == "txt" || suffix == "msh4" || suffix == "medit" || suffix == "tetgen" ||
+      suffix == "ascii")
     return Kind::unknown;
   return kind_from_name(suffix);
 }
@@ -216,7 +219,7 @@ bool is_binary(Kind kind) {
   return kind != Kind::particles && kind != Kind::ela && kind != Kind::obj && kind != Kind::off &&
          kind != Kind::dxf && kind != Kind::gltf && kind != Kind::dae && kind != Kind::csv &&
          kind != Kind::msh && kind != Kind::medit && kind != Kind::tetgen && kind != Kind::html &&
-         kind != Kind::inp && kind != Kind::feb;
+         kind != Kind::inp && kind != Kind::feb && kind != Kind::svg && kind != Kind::ascii;
 }
 
 } // namespace gewebe

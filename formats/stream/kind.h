@@ -42,6 +42,8 @@ enum class Kind {
   feb, ///< FEBio
   mp4,
   webm,
+  svg,
+  ascii, ///< a drawing of letters
 };
 
 /// The name of `--format` and `--to`: "vdb", "3ds", …

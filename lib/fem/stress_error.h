@@ -31,6 +31,14 @@ struct StressError {
   std::vector<double> at_node;
 };
 
+/// What mesh and order of the elements cause, estimated: gewebe_serve(5).
+struct DiscretisationError {
+  double relative = 0;     ///< of the energy, and so of forces and displacements
+  double force = 0;        ///< of the sum of forces at displaced and touched nodes, 1e-6 N
+  double displacement = 0; ///< of the largest displacement of another node, mm
+  double stress = 0;       ///< at the node of the largest von Mises stress, Pa
+};
+
 /// \param stresses  of solid_stresses(), one per element \pre elements are those of the mesh
 /// The same bytes for any number of threads.
 StressError stress_error(const TetMesh& mesh, std::span<const SolidElement> elements,

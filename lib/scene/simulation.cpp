@@ -154,6 +154,27 @@ InstrumentReport Simulation::instrument(std::size_t instrument) const {
   return report_of(*world_, instrument);
 }
 
+std::vector<AttachmentReport> Simulation::attachments() const {
+  const auto position = [&](std::size_t object, std::uint32_t node) {
+    const Object& o = world_->now.objects[object];
+    return o.model().nodes[node].position + motion_of(o)[node].displacement;
+  };
+  std::vector<AttachmentReport> all;
+  for (const Tie& tie : world_->now.ties) {
+    auto found = std::ranges::find_if(all, [&](const AttachmentReport& a) {
+      return a.object == tie.object && a.other == tie.other;
+    });
+    if (found == all.end())
+      found = all.insert(all.end(), AttachmentReport{tie.object, tie.other, 0, {}});
+    ++found->springs;
+    const Vec3 way = position(tie.other, tie.other_node) - position(tie.object, tie.node);
+    const double length = norm(way);
+    if (length > 0)
+      found->force += way * (tie.stiffness * (length - tie.rest) / length);
+  }
+  return all;
+}
+
 // ---- changes
 
 void Simulation::apply(const Change& change) {

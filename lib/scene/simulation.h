@@ -133,6 +133,13 @@ struct InstrumentReport {
   std::size_t nodes = 0; ///< number of nodes that it touches or grasps
 };
 
+/// Springs that attach one object to another, at the end of the last step.
+struct AttachmentReport {
+  std::size_t object = 0, other = 0;
+  std::size_t springs = 0;
+  Vec3 force; ///< of all springs on `object`, 1e-6 N
+};
+
 /// Contents of the answer to a step.
 struct Emits {
   bool forces = false, shapes = false, instruments = false;
@@ -196,6 +203,9 @@ public:
   /// Number of instruments for which a SetInstrument was accepted.
   std::size_t instrument_count() const noexcept;
   InstrumentReport instrument(std::size_t instrument) const;
+
+  /// Attachments in the order in which they were made, one for each pair of objects.
+  std::vector<AttachmentReport> attachments() const;
 
   /// Applies a change now. \pre objects and nodes exist, numbers are finite
   /// \throw Error if a node should move along an axis that the model holds; if a node should move

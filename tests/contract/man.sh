@@ -33,6 +33,14 @@ test_options_stand_in_the_page_and_the_reverse() {
   done
 }
 
+test_options_of_plot_stand_in_its_page() {
+  plot() { gewebe plot "$@"; }
+  options_of_help plot >help.txt
+  options_of_page "$GEWEBE_ROOT/man/gewebe-plot.1" >page.txt
+  grep -qx -e --y help.txt || fail 'gewebe plot --help shows no options'
+  compare_options help.txt page.txt gewebe-plot
+}
+
 test_a_missing_option_is_seen() {
   printf '%s\n' '.It Fl o , Fl Fl output Ar FILE' '.It Fl Fl stats Ns Op = Ns Ar FILE' '.It Fl Fl help' >page.1
   options_of_page page.1 >page.txt

@@ -100,7 +100,7 @@ test_what_is_kept_is_said_and_the_old_result_stays() {
     ffe-run -q wrong.scene -o run.$kind 2>stderr.txt || true
     case $kind in
       h5 | vtkhdf) grep -q "^ffe-run: wrong.scene:34: .*; 31 frames up to 0.3 s kept in run.partial.$kind\$" stderr.txt ;;
-      csv) grep -q '; forces of 31 frames up to 0.3 s kept in run.partial.csv$' stderr.txt ;;
+      csv) grep -q '; 31 frames up to 0.3 s kept in run.partial.csv$' stderr.txt ;;
       *) grep -q "; the shape at 0.3 s kept in run.partial.$kind\$" stderr.txt ;;
     esac || fail "another message for $kind:" "$(<stderr.txt)"
     [[ $(<run.$kind) == old && -s run.partial.$kind ]] || fail "no partial $kind" "$(ls -A)"

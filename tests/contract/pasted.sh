@@ -82,6 +82,7 @@ test_ffe_run() { for_release && page ffe-run.1; }
 test_emboss_render() { for_release && page emboss-render.1; }
 test_gewebe() { for_release && page gewebe.7; }
 test_gewebe_contact() { for_release && page gewebe-contact.7; }
+test_gewebe_plot() { for_release && page gewebe-plot.1; }
 test_gewebe_command() { for_release && page gewebe.1; }
 test_gewebe_serve() { for_release && page gewebe_serve.5; }
 test_gewebe_solids() { for_release && page gewebe-solids.7; }

@@ -121,6 +121,7 @@ test_answers_and_results_go_where_they_should() {
   ffe-run -q pull.scene | cmp - answers
   ffe-run --to csv pull.scene | cmp - out.csv
   cmp out.csv quiet.csv
+  ffe-run -q --rows node pull.scene -o out.csv
   [[ $(head -1 out.csv) == time,object,node,fx,fy,fz && $(wc -l <out.csv) == 2 ]] || fail 'other forces:' "$(<out.csv)"
   # The force of the answer, digit by digit.
   [[ $(sed -n 2p out.csv) == "0.01,organ,$(sed -n '3s/ /,/gp' answers)" ]] || fail 'forces differ' "$(<out.csv)" "$(<answers)"

@@ -146,7 +146,7 @@ test_only_what_is_touched_is_read() {
     esac
   done >in.scene
   printf '%s\n' 'emit forces' step 'displace o5 6 0 0 0.01' step 'method o7 ela' 'step 0.1' >>in.scene
-  ffe-run --stats=out.json in.scene -o forces.csv >answers
+  ffe-run --stats=out.json --rows node in.scene -o forces.csv >answers
   grep -q '"objects":20,"models_read":1,"stores_opened":1,' out.json || fail 'more was read:' "$(<out.json)"
   [[ $(wc -l <forces.csv) == 3 ]] || fail "$(<forces.csv)"
   if has_strace; then

@@ -4,6 +4,7 @@
 #include "convex_meshes.h"
 #include "embedding/skin.h"
 #include "fem/solid_model.h"
+#include "formats/curves/number_table.h"
 #include "formats/mesh/ply.h"
 #include "formats/results/results.h"
 #include "formats/results/results_writer.h"
@@ -12,6 +13,7 @@
 #include "sim_models.h"
 #include "tests/unit/complaint.h"
 #include "tet_fixtures.h"
+#include "text/number_text.h"
 
 #include <algorithm>
 #include <array>
@@ -63,9 +65,10 @@ Model textured() {
 }
 
 /// Two objects, the second from the second frame on; displacement k / 8 of value k.
-void write(Kind kind, const std::string& path, const Model& a, const Model& b) {
+void write(Kind kind, const std::string& path, const Model& a, const Model& b,
+           TableRows rows = TableRows::frame) {
   const std::unique_ptr<ResultWriter> result =
-      open_result(kind, path, Output::Options{.binary = is_binary(kind)});
+      open_result(kind, path, Output::Options{.binary = is_binary(kind)}, rows);
   std::vector<double> ua(3 * a.nodes.size()), ub(3 * b.nodes.size());
   const std::vector<NodeVector> none, forces{{3, {1, 2, 3}}, {7, {-0.5, 0, 1e-3}}};
   result->add_object("z-a", a);
@@ -376,12 +379,90 @@ TEST(Results, ShapesOfSeveralObjectsBecomeParts) {
 TEST(Results, ForcesAsCsv) {
   const ScratchFolder folder;
   const Model a = textured(), b = test::organ(1);
-  write(Kind::csv, folder / "r.csv", a, b);
+  write(Kind::csv, folder / "r.csv", a, b, TableRows::node);
   EXPECT_EQ(bytes_of(folder / "r.csv"), "time,object,node,fx,fy,fz\n"
                                         "0.1,z-a,3,1,2,3\n"
                                         "0.1,z-a,7,-0.5,0,0.001\n"
                                         "1,b,3,1,2,3\n"
                                         "1,b,7,-0.5,0,0.001\n");
+}
+
+TEST(Results, FramesAsCsvGetColumnsAsTheyCome) {
+  const ScratchFolder folder;
+  write(Kind::csv, folder / "r.csv", textured(), test::organ(1));
+  const std::string force = number_text(norm(Vec3(0.5, 2, 3.001)));
+  EXPECT_EQ(bytes_of(folder / "r.csv"),
+            "time [s],z-a.node_force_x [uN],z-a.node_force_y [uN],z-a.node_force_z [uN],"
+            "z-a.node_force [uN],z-a.force_nodes,b.node_force_x [uN],b.node_force_y [uN],"
+            "b.node_force_z [uN],b.node_force [uN],b.force_nodes\n"
+            "0,0,0,0,0,0,,,,,\n"
+            "0.1,0.5,2,3.001," +
+                force + ",2,0,0,0,0,0\n1,0,0,0,0,0,0.5,2,3.001," + force + ",2\n");
+}
+
+TEST(Results, DepthCountsFromTheLastFrameWithoutATouch) {
+  const ScratchFolder folder;
+  const std::string path = folder / "r.csv";
+  {
+    const std::unique_ptr<ResultWriter> result =
+        open_result(Kind::csv, path, Output::Options{.binary = false});
+    FrameInstrument probe{"p", true, {.radius = 2, .axis = {}}, {}, {}, {0, 3, 4}, {}, 0};
+    const auto add = [&](double z, std::uint64_t touched) {
+      probe.pose.place = {0, 0, z};
+      probe.nodes = touched;
+      result->set_instruments(std::vector<FrameInstrument>{probe});
+      result->add_frame(z, {});
+    };
+    add(9, 0);
+    add(8, 0);
+    add(6, 2);
+    add(5, 1);
+    add(4, 0);
+    add(4, 1);
+    result->set_attachments(std::vector<FrameAttachment>{{"a", "b", 2, {0, 0, 5}}});
+    result->add_frame(3, {});
+    result->commit();
+  }
+  const NumberTable table = read_number_table(bytes_of(path), path);
+  const std::vector<double>& depth = find_column(table, "depth").values;
+  ASSERT_EQ(depth.size(), 7U);
+  EXPECT_EQ(std::vector<double>(depth.begin(), depth.end() - 1),
+            (std::vector<double>{0, 0, 2, 3, 0, 0}));
+  EXPECT_TRUE(std::isnan(depth.back())); // the instrument has gone
+  EXPECT_EQ(find_column(table, "p.force [uN]").values[0], 5);
+  EXPECT_EQ(find_column(table, "a+b.attach_force").values[6], 5);
+  EXPECT_TRUE(std::isnan(find_column(table, "a+b.springs").values[0]));
+}
+
+TEST(Results, EstimatesAreKeptOverTime) {
+  const ScratchFolder folder;
+  const std::string path = folder / "run.h5", curves = folder / "run.csv";
+  const Model model = test::organ(1);
+  const std::vector<double> u(3 * model.nodes.size());
+  const std::optional<DiscretisationError> none, some = DiscretisationError{0.5, 7, 0.25, 90};
+  for (const Kind kind : {Kind::hdf5, Kind::csv}) {
+    const std::unique_ptr<ResultWriter> result = open_result(
+        kind, kind == Kind::csv ? curves : path, Output::Options{.binary = is_binary(kind)});
+    result->add_object("o", model);
+    FrameObject object{u, {}};
+    result->add_frame(0, std::span(&object, 1));
+    object.estimate = &none;
+    result->add_frame(1, std::span(&object, 1));
+    object.estimate = &some;
+    result->add_frame(2, std::span(&object, 1));
+    result->commit();
+  }
+  const hdf5::File file = hdf5::File::open(path);
+  const hdf5::Group group = file.root().group("objects").group("o").group("estimates");
+  EXPECT_EQ(group.number<std::uint64_t>("first_frame"), 1U);
+  std::vector<double> stress(2);
+  group.dataset("stress", hdf5::Number::float64).read_rows(0, std::span<double>(stress));
+  EXPECT_TRUE(std::isnan(stress[0]));
+  EXPECT_EQ(stress[1], 90);
+  const NumberTable table = read_number_table(bytes_of(curves), curves);
+  EXPECT_EQ(find_column(table, "estimate_relative").values[2], 0.5);
+  EXPECT_TRUE(std::isnan(find_column(table, "estimate_relative").values[1]));
+  EXPECT_EQ(find_column(table, "o.estimate_displacement [mm]").values[2], 0.25);
 }
 
 TEST(Results, ReadingNamesWhatIsMissing) {

@@ -248,6 +248,12 @@ TEST(Simulation, ATieIsDampedByTheMeanRatioOfItsObjects) {
     const auto apart = [&] { return moved(s, 1, 1).z - moved(s, 0, 1).z; };
     const double drawn = apart();
     EXPECT_NEAR(drawn, force / stiffness, 1e-6);
+    const std::vector<AttachmentReport> attachments = s.attachments();
+    ASSERT_EQ(attachments.size(), 1U);
+    EXPECT_EQ(attachments[0].object, 0U);
+    EXPECT_EQ(attachments[0].other, 1U);
+    EXPECT_EQ(attachments[0].springs, 1U);
+    EXPECT_NEAR(attachments[0].force.z, force, 1e-4); // it pulls against the force
     s.apply(Release{0, {1}});
     s.apply(Release{1, {1}});
     const double ratio = 0.3, damped = std::sqrt(1 - ratio * ratio);

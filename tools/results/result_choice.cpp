@@ -28,6 +28,11 @@ void ResultChoice::declare(cli::Program& program) {
   program
       .option("--field-outside", field_outside_, "VALUE", "vectors outside all elements: zero, nan")
       .one_of({"zero", "nan"});
+  program
+      .option("--rows", rows_, "WHAT",
+              "rows of a csv: one per frame with all its numbers, or per displaced or touched node")
+      .one_of({"frame", "node"});
+  rows_given_ = [&program] { return program.given("--rows"); };
 }
 
 void ResultChoice::check(const cli::Program& program) const {
@@ -47,6 +52,8 @@ Kind ResultChoice::kind(const cli::Run& run) const {
   if ((kind == Kind::hdf5 || kind == Kind::vtkhdf) && run.output() == "-")
     throw UsageError(std::string(kind_name(kind)) +
                      " can't go to standard output, expected -o FILE");
+  if (rows_given_() && kind != Kind::csv)
+    throw UsageError("--rows is for a result of kind csv, expected -o FILE.csv or --to csv");
   return kind;
 }
 
@@ -54,7 +61,8 @@ std::unique_ptr<ResultWriter> ResultChoice::open(cli::Run& run, Kind kind) const
   if (kind == Kind::unknown)
     return nullptr;
   if (kind != Kind::nifti)
-    return open_result(kind, run.output(), run.output_options(is_binary(kind)));
+    return open_result(kind, run.output(), run.output_options(is_binary(kind)),
+                       rows_ == "node" ? TableRows::node : TableRows::frame);
   FieldOptions options;
   options.like = field_;
   options.at_rest = field_at_ == "rest";

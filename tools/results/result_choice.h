@@ -5,6 +5,7 @@
 #include "formats/stream/kind.h"
 #include "tools/cli/cli.h"
 
+#include <functional>
 #include <memory>
 #include <string>
 
@@ -23,7 +24,8 @@ public:
   std::unique_ptr<ResultWriter> open(cli::Run& run, Kind kind) const;
 
 private:
-  std::string field_, field_at_ = "deformed", field_outside_ = "zero";
+  std::string field_, field_at_ = "deformed", field_outside_ = "zero", rows_ = "frame";
+  std::function<bool()> rows_given_;
 };
 
 } // namespace gewebe

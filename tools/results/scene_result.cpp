@@ -9,6 +9,19 @@
 
 namespace gewebe {
 
+namespace {
+
+/// Of vectors, each three numbers.
+double largest_norm(std::span<const double> u) {
+  double largest = 0;
+  for (std::size_t k = 0; k + 2 < u.size(); k += 3)
+    if (const double size = norm({u[k], u[k + 1], u[k + 2]}); !(size <= largest))
+      largest = size;
+  return largest;
+}
+
+} // namespace
+
 void SceneResult::need_models(const Simulation& simulation, std::size_t objects) const {
   for (std::size_t i = 0; writer_.wants_models() && i < objects; ++i)
     (void)simulation.first_model(i);
@@ -71,15 +84,33 @@ void SceneResult::set_instruments(const Simulation& simulation) {
   deliver([&] { writer_.set_instruments(instruments); });
 }
 
-void SceneResult::frame(const Simulation& simulation) {
+void SceneResult::set_attachments(const Simulation& simulation) {
+  std::vector<FrameAttachment> attachments;
+  for (const AttachmentReport& a : simulation.attachments())
+    attachments.push_back(
+        {simulation.object(a.object).name, simulation.object(a.other).name, a.springs, a.force});
+  deliver([&] { writer_.set_attachments(attachments); });
+}
+
+void SceneResult::frame(const Simulation& simulation, std::span<const EstimateAnswer> estimates) {
   add_objects(simulation, simulation.object_count());
   change_objects(simulation);
   set_instruments(simulation);
+  const bool curves = writer_.wants_curves();
+  if (curves)
+    set_attachments(simulation);
   std::vector<FrameObject> frame;
-  for (std::size_t i = 0; i < simulation.object_count(); ++i)
-    frame.push_back(
-        {writer_.wants_models() ? simulation.displacement(i) : std::span<const double>(),
-         simulation.contact_forces(i), stress_.fields(i)});
+  for (std::size_t i = 0; i < simulation.object_count(); ++i) {
+    FrameObject& object = frame.emplace_back();
+    if (writer_.wants_models())
+      object.displacement = simulation.displacement(i);
+    object.forces = simulation.contact_forces(i);
+    object.fields = stress_.fields(i);
+    if (i < estimates.size())
+      object.estimate = &estimates[i].error;
+    if (curves && simulation.settings().emits.any_shapes())
+      object.largest_displacement = largest_norm(simulation.surface_displacement(i));
+  }
   deliver([&] { writer_.add_frame(simulation.time(), frame); });
   ++frames_;
 }

@@ -2,11 +2,13 @@
 // Passes a running scene to a result: new objects, cut models, frames.
 
 #include "formats/results/results_writer.h"
+#include "formats/scene/scene_answer.h"
 #include "scene/simulation.h"
 #include "tools/results/scene_stress.h"
 
 #include <cstddef>
 #include <cstdint>
+#include <span>
 
 namespace gewebe {
 
@@ -21,7 +23,8 @@ public:
   /// The first objects, and the frame before anything moves if there is none.
   void first_frame(const Simulation& simulation, std::size_t objects);
   /// Behind a step, whose news were not taken yet: new objects, models that were cut, the frame.
-  void frame(const Simulation& simulation);
+  /// \param estimates  of all objects, or none
+  void frame(const Simulation& simulation, std::span<const EstimateAnswer> estimates = {});
 
   std::uint64_t frames() const noexcept { return frames_; }
 
@@ -29,6 +32,7 @@ private:
   void add_objects(const Simulation& simulation, std::size_t objects);
   void change_objects(const Simulation& simulation);
   void set_instruments(const Simulation& simulation);
+  void set_attachments(const Simulation& simulation);
 
   ResultWriter& writer_;
   const SceneStress& stress_;

@@ -120,7 +120,7 @@ void SceneRun::State::answer() {
   if (options.latency != nullptr)
     deliver([&] { options.latency->answered(steps, simulation.time()); });
   if (result)
-    result->frame(simulation);
+    result->frame(simulation, estimated);
   simulation.take_news();
   if (options.measure)
     deliver([&] { measure(); });

@@ -1,0 +1,50 @@
+#pragma once
+// Curves y(x) on one sheet, drawn as SVG or as letters.
+
+#include "formats/curves/number_table.h"
+
+#include <cstddef>
+#include <span>
+#include <string>
+#include <vector>
+
+namespace gewebe {
+
+/// Range of an axis, from one round number to another, and the numbers at its marks.
+struct CurveAxis {
+  double min = 0, max = 1;
+  std::vector<double> marks;      ///< ascending, at least two
+  std::vector<std::string> texts; ///< of the marks, all with the same number of decimals
+  std::string title;              ///< with unit
+};
+
+struct Curve {
+  std::string name;
+  std::vector<double> x, y; ///< of equal length; NaN: a gap
+};
+
+struct CurveSheet {
+  std::string title;
+  CurveAxis x, y;
+  std::vector<Curve> curves;
+};
+
+/// Round numbers (1, 2 or 5 times a power of ten apart) that enclose min and max, about `count`.
+/// \pre finite, min <= max
+CurveAxis round_axis(double min, double max, std::size_t count);
+
+/// Columns against one column. Large numbers get a larger unit: 23000 uN is 23 mN.
+/// \throw UsageError if a column holds words, or the units of `ys` differ
+/// \throw Error if no row has numbers in both, or a number is beyond 1e300
+CurveSheet curve_sheet(const NumberColumn& x, std::span<const NumberColumn* const> ys,
+                       const std::string& title);
+
+/// SVG 1.1 of that size in pixels, from 200 x 150. Text is text, in the viewer's sans-serif font;
+/// colours are those of Okabe and Ito, which colour-blind people can tell apart, with dashes
+/// beyond.
+std::string curves_svg(const CurveSheet& sheet, double width, double height);
+
+/// Letters in lines of that many columns, from 40 x 10.
+std::string curves_ascii(const CurveSheet& sheet, std::size_t columns, std::size_t lines);
+
+} // namespace gewebe

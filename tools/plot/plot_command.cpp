@@ -1,0 +1,95 @@
+#include "tools/plot/plot_command.h"
+
+#include "base/error.h"
+#include "formats/curves/curve_sheet.h"
+#include "formats/curves/number_table.h"
+#include "formats/stream/stream.h"
+#include "tools/cli/cli.h"
+
+#include <cstddef>
+#include <cstdint>
+#include <string>
+#include <string_view>
+#include <unistd.h>
+#include <vector>
+
+namespace gewebe {
+
+namespace {
+
+struct PlotArguments {
+  std::string table = "-", x, y, title;
+  std::vector<double> size;
+};
+
+/// Words between commas.
+std::vector<std::string> names_in(std::string_view list) {
+  std::vector<std::string> names;
+  for (std::size_t start = 0; start <= list.size();) {
+    const std::size_t end = std::min(list.find(',', start), list.size());
+    names.emplace_back(list.substr(start, end - start));
+    start = end + 1;
+  }
+  return names;
+}
+
+/// Size of the drawing: as asked, or the default of its kind. \throw UsageError
+std::vector<double> drawing_size(const PlotArguments& in, Kind kind) {
+  const bool ascii = kind == Kind::ascii;
+  const std::vector<double> smallest =
+                                ascii ? std::vector<double>{40, 10} : std::vector<double>{200, 150},
+                            largest = ascii ? std::vector<double>{1000, 1000}
+                                            : std::vector<double>{10000, 10000},
+                            usual =
+                                ascii ? std::vector<double>{78, 24} : std::vector<double>{800, 500};
+  if (in.size.empty())
+    return usual;
+  for (std::size_t k = 0; k < 2; ++k)
+    if (!(in.size[k] >= smallest[k] && in.size[k] <= largest[k]) ||
+        in.size[k] != static_cast<double>(static_cast<std::int64_t>(in.size[k])))
+      throw UsageError("--size: expected two whole numbers of " + std::to_string(int(smallest[0])) +
+                       "," + std::to_string(int(smallest[1])) + " to " +
+                       std::to_string(int(largest[0])) + "," + std::to_string(int(largest[1])));
+  return in.size;
+}
+
+void work(cli::Run& run, const PlotArguments& in) {
+  const bool terminal = run.output() == "-" && ::isatty(1) != 0;
+  const Kind kind = output_kind(run.to(), run.output(), terminal ? Kind::ascii : Kind::svg,
+                                {Kind::svg, Kind::ascii});
+  const std::vector<double> size = drawing_size(in, kind);
+  Output output(run.output(), run.output_options(false));
+  Input input(in.table, false);
+  const NumberTable table = read_number_table(input.read_all(), input.name());
+  if (in.y.empty())
+    throw UsageError("--y is required, expected some of " + column_list(table));
+  const NumberColumn& x = in.x.empty() ? table.columns.front() : find_column(table, in.x);
+  std::vector<const NumberColumn*> ys;
+  for (const std::string& name : names_in(in.y))
+    ys.push_back(&find_column(table, name));
+  const CurveSheet sheet = at(input.name(), [&] { return curve_sheet(x, ys, in.title); });
+  run.stats().set("rows", static_cast<std::uint64_t>(x.values.size()));
+  run.stats().set("curves", static_cast<std::uint64_t>(ys.size()));
+  output.write(kind == Kind::svg ? curves_svg(sheet, size[0], size[1])
+                                 : curves_ascii(sheet, static_cast<std::size_t>(size[0]),
+                                                static_cast<std::size_t>(size[1])));
+  output.commit();
+}
+
+} // namespace
+
+int run_plot(int argc, char** argv) {
+  cli::Program p("gewebe plot", "Draws columns of a table against each other, as curves.");
+  PlotArguments in;
+  p.option("--x", in.x, "NAME", "column along the horizontal axis; default: the first one");
+  p.option("--y", in.y, "NAME,...", "columns along the vertical axis, of one unit");
+  p.option("--title", in.title, "TEXT", "text above the curves");
+  p.option("--size", in.size, "W,H",
+           "size in pixels, or in letters for ascii; default: 800,500 or 78,24")
+      .count(2);
+  p.output_kinds({Kind::svg, Kind::ascii});
+  p.operand("TABLE", in.table, "CSV with names in its first line, - for standard input");
+  return p.run(argc, argv, [&](cli::Run& run) { work(run, in); });
+}
+
+} // namespace gewebe
