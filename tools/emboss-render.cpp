@@ -8,6 +8,7 @@
 #include "tools/render/picture_sink.h"
 #include "tools/render/render_arguments.h"
 #include "tools/render/render_field.h"
+#include "tools/render/render_legend.h"
 #include "tools/render/render_materials.h"
 #include "tools/render/render_page.h"
 #include "tools/render/render_pictures.h"
@@ -73,6 +74,7 @@ void draw(cli::Run& run, cli::RenderArguments& a, Input& input, cli::PictureSink
                a.frames.empty() ? std::vector{a.reading.frame.value_or(-1)} : frames);
   sink.expect(frames.size());
   cli::Pictures pictures(run, a);
+  cli::SurfaceLegends legends(a, input);
   Digest digest;
   Image picture;
   std::vector<Surface> surfaces;
@@ -83,8 +85,10 @@ void draw(cli::Run& run, cli::RenderArguments& a, Input& input, cli::PictureSink
       surfaces =
           run.timed("read", [&] { return read(run, input, a.reading, a.drawing.occlusion > 0); });
     picture = pictures.of(surfaces);
+    const std::int64_t shown = a.frames.empty() ? a.reading.frame.value_or(-1) : frame;
+    const bool same = legends.draw(picture, pictures.camera(), shown) && pictures.kept();
     digest.add(picture.values);
-    run.timed("write", [&] { sink.put(picture, pictures.kept(), frame); });
+    run.timed("write", [&] { sink.put(picture, same, frame); });
   }
   run.timed("write", [&] { sink.commit(); });
   pictures.tell(run.stats(), picture);

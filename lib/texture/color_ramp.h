@@ -17,8 +17,9 @@ struct ColorRamp {
   std::vector<std::array<std::uint8_t, 3>> colors; ///< one at least
 };
 
-/// "gray" (black to white), "heat" (black, red, yellow, white), "rainbow" (blue, cyan, green,
-/// yellow, red).
+/// "viridis" and "cividis" (equal steps look equal, also to colour-blind people; cividis to all
+/// alike), "gray" (black to white), "heat" (black, red, yellow, white), "rainbow" (blue, cyan,
+/// green, yellow, red).
 const std::vector<std::string>& color_ramp_names();
 /// \throw Error if there is no such ramp
 ColorRamp color_ramp_from_name(std::string_view name);

@@ -4,6 +4,7 @@
 #include "tools/render/render_camera.h"
 #include "tools/render/render_field.h"
 #include "tools/render/render_layer.h"
+#include "tools/render/render_legend.h"
 #include "tools/render/render_lighting.h"
 #include "tools/render/render_materials.h"
 #include "tools/render/render_page.h"
@@ -167,6 +168,7 @@ void complete(RenderArguments& a) {
     refuse(norm(*a.light) == 0, "--light-direction: expected another vector than 0");
   }
   complete_field(a);
+  complete_legend(a);
   refuse(a.no_instruments && a.instrument_color,
          "--instrument-color with --no-instruments, expected one of them");
   refuse(!a.frames.empty() && a.reading.frame.has_value(),
@@ -269,6 +271,7 @@ void declare(Program& p, RenderArguments& a) {
   p.option("--unit", a.reading.unit, "UNIT", "unit of the mesh: m, cm, mm")
       .one_of(surface_unit_names());
   declare_field(p, a);
+  declare_legend(p, a);
   declare_volume(p, a);
   p.check([&p, &a] {
     note_look_options(p, a);

@@ -6,6 +6,7 @@
 #include "shading/drawing.h"
 #include "shading/uv.h"
 #include "shading/volume_view.h"
+#include "texture/color_ramp.h"
 #include "texture/surface_material.h"
 #include "tools/cli/cli.h"
 #include "tools/render/surface_file.h"
@@ -69,13 +70,15 @@ struct RenderArguments {
   UvOptions mapping;
   PictureOptions picture;
   RenderVolume volume;
+  ColorRamp ramp;                        ///< of a field, see take_field
+  bool legend = false;                   ///< pictures have one
   std::vector<std::string> look_options; ///< given options of looks and views
 
   // Words that declare() turns into the above.
   struct Words {
     std::string size = "512", backend = "auto", uv = "auto", view, passes = "shader",
                 target = "float", tbn = "auto", filter = "mipmap", wrap = "repeat",
-                sphere = "reflection", by = "material", compare;
+                sphere = "reflection", by = "material", compare, legend = "auto";
     std::vector<double> orbit{0, 0};
     std::int64_t msaa = 1, rgb_scale = 2;
     std::optional<Vec3> light_direction, color, background;

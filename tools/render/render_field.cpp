@@ -42,8 +42,8 @@ void take_field(Run& run, RenderArguments& a, const Input& input,
                 const std::vector<std::int64_t>& frames) {
   if (a.reading.field.empty())
     return;
-  a.common.base =
-      ramp_texture(ramp_of(a.volume.ramp.empty() ? "rainbow" : a.volume.ramp, run.context()));
+  a.ramp = ramp_of(a.volume.ramp.empty() ? "viridis" : a.volume.ramp, run.context());
+  a.common.base = ramp_texture(a.ramp);
   std::array<double, 2> range{};
   if (a.volume.range.empty()) {
     range = run.timed("read", [&] { return result_field_range(input, a.reading, frames); });

@@ -56,7 +56,8 @@ const std::vector<std::string>& picture_options() {
                                               "--gl-target",
                                               "--rgb-scale",
                                               "--tbn",
-                                              "--compare"};
+                                              "--compare",
+                                              "--legend"};
   return names;
 }
 

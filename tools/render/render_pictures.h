@@ -26,6 +26,8 @@ public:
   const Image& of(std::vector<Surface> surfaces);
   /// Whether the last picture is that before it.
   bool kept() const { return kept_last_; }
+  /// That of the last picture. \pre there is one
+  const Camera& camera() const { return *camera_; }
   /// What is known at the end.
   void tell(Stats& stats, const Image& last) const;
 

@@ -5,6 +5,7 @@
 #include "raster/raster_cpu.h"
 #include "texture/color_ramp.h"
 #include "texture/surface_material.h"
+#include "tools/render/render_legend.h"
 
 #include <algorithm>
 #include <charconv>
@@ -63,8 +64,9 @@ void declare_volume(Program& p, RenderArguments& a) {
   p.option("--extinction", a.volume.view.transfer.extinction, "K",
            "extinction per mm at the last colour; default: 8 over the longest side")
       .positive();
-  p.option("--ramp", a.volume.ramp, "RAMP", "colours of values: gray, heat, rainbow, or an image")
-      .such_as({"gray", "heat", "rainbow"});
+  p.option("--ramp", a.volume.ramp, "RAMP",
+           "colours of values: viridis, cividis, gray, heat, rainbow, or an image")
+      .such_as(color_ramp_names());
   p.option("--range", a.volume.range, "A,B", "values of the first and last colour; default: all")
       .count(2);
 }
@@ -173,6 +175,7 @@ Image volume_picture(Run& run, const RenderArguments& a, Input& input) {
   Image image = shrunk(translucent ? composed(view, a.words.background.value_or(Vec3{}))
                                    : colored(view.values, view.width, view.height, min, max, ramp),
                        finer);
+  draw_volume_legend(image, a, ramp, {min, max}, 2 * view.half_width / image.width);
   const auto [low, high] = std::ranges::minmax_element(view.values);
   Stats& stats = run.stats();
   stats.set("range", std::vector<double>{min, max});

@@ -222,7 +222,7 @@ ShownScene build_scene(Run& run, const RenderArguments& a, Input& input,
   }
   if (triangles == 0)
     run.warn(input.name() + ": no triangle to draw");
-  const ColorRamp ramp = ramp_of(a.volume.ramp.empty() ? "rainbow" : a.volume.ramp, run.context());
+  const ColorRamp ramp = ramp_of(a.volume.ramp.empty() ? "viridis" : a.volume.ramp, run.context());
   for (int n = 0; n < 256; ++n) {
     const std::array<double, 3> color = ramp_color(ramp, n / 255.0);
     scene.ramp.push_back({static_cast<std::uint8_t>(std::floor(color[0] + 0.5)),
