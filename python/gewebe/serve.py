@@ -1,4 +1,7 @@
 """Running scenes, gewebe_serve(5): ffe-run --serve, driven through a socket, with shapes in shared memory."""
+from __future__ import annotations
+
+import io
 import mmap
 import os
 import socket
@@ -7,17 +10,60 @@ import subprocess
 import tempfile
 import time
 
+from typing import Any
+
 import numpy
 
+from .answers import Answer, read_answers
+from .ela import read_ela
 from .errors import Error
-from .programs import path_of
+from .ply import write_ply
+from .programs import path_of, run
+
+
+def _word(value: Any) -> str:
+    """A word of a scene line: numbers exactly, others in quotes where they need them."""
+    if isinstance(value, (bool, numpy.bool_)):
+        raise ValueError(f'{value} is no word of a scene')
+    if isinstance(value, (int, numpy.integer)):
+        return str(int(value))
+    if isinstance(value, (float, numpy.floating)):
+        if not numpy.isfinite(value):
+            raise ValueError(f'{value} in a line, expected finite numbers')
+        return repr(float(value))
+    text = os.fspath(value)
+    if '"' in text or '\n' in text:
+        raise ValueError(f'{text!r} in a line, expected no double quote and no end of line')
+    return f'"{text}"' if not text or any(c in text for c in ' \t#') else text
+
+
+def scene_line(*words: Any) -> str:
+    """A line of a scene, scene(5), of words, paths, numbers and arrays of numbers:
+    scene_line('displace', 'ball', 'z>48', numpy.array([0, 0, 3.]))."""
+    parts: list[str] = []
+    for word in words:
+        if isinstance(word, (numpy.ndarray, list, tuple)):
+            parts += [_word(number) for number in word]
+        else:
+            parts.append(_word(word))
+    return ' '.join(parts)
 
 
 class Scene:
-    """A client of ffe-run --serve --ack --listen PATH. time is the time of the scene in s at the connection. A context
-    manager."""
+    """A running scene: objects come by add, commands by tell, time goes on by step and run.
+
+    Scene() starts a run of its own, as drive() does; Scene(path) is a client of ffe-run --serve --ack --listen PATH.
+    time is the time of the scene in s at the connection. A context manager; notebooks show it as a picture.
+    """
+
+    _ended = False
+    _cwd: str | os.PathLike[str] | None = None  # where paths in lines count from, if not from here
+
+    def __new__(cls, path: str | os.PathLike[str] | None = None, *args: Any, **more: Any) -> Scene:
+        return super().__new__(Driven if cls is Scene and path is None else cls)
 
     def __init__(self, path, patience=10.0):
+        self._surfaces: dict[str, numpy.ndarray] = {}
         until = time.monotonic() + patience
         while time.monotonic() < until:
             self.socket = socket.socket(socket.AF_UNIX)
@@ -44,6 +90,7 @@ class Scene:
         self.close()
 
     def _leave(self):
+        self._ended = True
         self.answers.close()
         self.socket.close()
 
@@ -54,6 +101,8 @@ class Scene:
     def send(self, line):
         if '\n' in line:
             raise ValueError('more than one line')
+        if self._ended:
+            raise Error('the scene is closed, expected an open one')
         self.number += 1
         self.socket.sendall((line + '\n').encode())
 
@@ -80,6 +129,34 @@ class Scene:
                     raise Error(refused)
                 return said
         raise Error(refused or 'the connection ended')
+
+    def tell(self, *words: Any) -> None:
+        """Carries out one command: scene.tell('displace', 'ball', 'near:0,0,50,5', 0, 0, 3). Raises Error if it is refused."""
+        self.ask(scene_line(*words))
+
+    def add(self, name: str, model: str | os.PathLike[str], *words: Any, **settings: Any) -> None:
+        """Adds an object: the file of its model, further words, and settings: scene.add('ball', 'ball.ela', method='ffe')."""
+        path = os.path.join(self._cwd or '', model)
+        self.tell('object', name, model, *words, *(f'{key}={value}' for key, value in settings.items()))
+        self._surfaces[name] = read_ela(path).triangles
+
+    def step(self, dt: float | None = None) -> Answer:
+        """Goes on by dt seconds (default: that of scene(5)) and returns the answer as arrays."""
+        return self._answers(self.ask('step' if dt is None else scene_line('step', float(dt))))[-1]
+
+    def run(self, until: float, every: float) -> list[Answer]:
+        """Goes on to the time `until` in steps of `every` seconds and returns their answers."""
+        return self._answers(self.ask(scene_line('run', float(until), 'every', float(every))))
+
+    def _answers(self, lines: list[list[str]]) -> list[Answer]:
+        answers = read_answers(lines)
+        for answer in answers:
+            for name, triangles in answer.triangles.items():
+                self._surfaces[name] = triangles
+            for word, name, *_ in answer.events:
+                if word in ('cut', 'restored') and name not in answer.triangles:
+                    self._surfaces.pop(name, None)  # unknown: shapes are not emitted
+        return answers
 
 
 class Shapes:
@@ -124,6 +201,7 @@ class Driven(Scene):
     """The scene of a run that `drive` started; closing it ends the run."""
 
     def __init__(self, *options, cwd=None):
+        self._cwd = cwd
         self.folder = tempfile.TemporaryDirectory(prefix='gewebe-')
         at, shapes_at = os.path.join(self.folder.name, 'socket'), os.path.join(self.folder.name, 'shapes')
         with open(os.path.join(self.folder.name, 'said'), 'wb') as said:
@@ -154,6 +232,28 @@ class Driven(Scene):
     def shapes(self):
         """Positions of all nodes, [n, 3] in mm, by object, of the last answer."""
         return self._shapes.last()
+
+    def picture(self, size: int | str = 400, *options: str) -> bytes:
+        """PNG of the objects that `add` has added, as they are in the last answer, by emboss-render with further options.
+
+        Raises Error before the first step, and for an object whose surface a cut has changed while no shapes are emitted.
+        """
+        parts, triangles, count = [], [], 0
+        for name, positions in self.shapes().items():
+            if name not in self._surfaces:
+                raise Error(f'the surface of {name} is unknown, expected an object that add() has added, and emit shapes before a cut')
+            triangles.append(self._surfaces[name] + count)
+            parts.append(positions)
+            count += len(positions)
+        if not parts:
+            raise Error('there is no answer to draw, expected a step first')
+        file = io.BytesIO()
+        write_ply(file, points=numpy.concatenate(parts), triangles=numpy.concatenate(triangles))
+        return run(['emboss-render', '--format', 'ply', '--size', str(size), '--to', 'png', *options], input=file.getvalue()).output
+
+    def _repr_png_(self) -> bytes | None:
+        """The picture that a notebook shows; None before the first step."""
+        return self.picture() if self._shapes.last() and not self._ended else None
 
     def __exit__(self, kind, *_):
         try:

@@ -407,6 +407,63 @@ class Driving(unittest.TestCase):
         mesh = gewebe.read_ply('driven.ply')
         self.assertTrue(numpy.allclose(mesh.points[tip], shape[tip]))
 
+    def test_steps_are_answered_by_arrays(self):
+        sphere_model()
+        with gewebe.Scene() as scene:
+            self.assertIsNone(scene._repr_png_())
+            with self.assertRaisesRegex(gewebe.Error, 'no answer to draw'):
+                scene.picture()
+            scene.add('ball', 'ball.ela', method='ffe')
+            for what in ('forces', 'shapes', 'instruments'):
+                scene.tell('emit', what)
+            scene.tell('instrument', 'p q'.replace(' ', '_'), 'sphere', 8, numpy.array([0, 0, 80.5]))
+            scene.tell('displace', 'ball', 'near:0,0,50,5', [0, 0, 1.5])
+            answer = scene.step(0.25)
+            said = scene.ask('step 0.25')
+            self.assertEqual((answer.step, answer.time), (1, 0.25))
+            node, *force = next(said[k + 1] for k, words in enumerate(said) if words[0] == 'forces')
+            self.assertEqual(answer.forces['ball'].nodes[0], int(node))
+            self.assertTrue((answer.forces['ball'].vectors[0] == numpy.array(force, float)).all())
+            self.assertGreater(answer.forces['ball'].total[2], 1000)
+            self.assertTrue((answer.shapes['ball'] == scene.shapes()['ball']).all())
+            self.assertEqual(answer.instruments['p_q'].position[2], 80.5)
+            self.assertIsNone(answer.instruments['p_q'].hand)
+            self.assertEqual([round(a.time, 3) for a in scene.run(1, 0.25)], [0.75, 1])
+            picture = scene._repr_png_()
+            self.assertEqual(picture[:8], b'\x89PNG\r\n\x1a\n')
+            self.assertEqual(struct.unpack('>2I', scene.picture('80x60')[16:24]), (80, 60))
+            with self.assertRaisesRegex(gewebe.Error, "no object 'bal', expected one of ball"):
+                scene.tell('force', 'bal', 'z>4', 0, 0, 1)
+        with self.assertRaisesRegex(gewebe.Error, 'the scene is closed'):
+            scene.step()
+
+    def test_stress_estimates_and_cuts_are_read(self):
+        sphere_model(more=['--solid', '--cell', '12', '-q'])
+        with gewebe.drive('--estimate') as scene:
+            scene.add('ball', 'ball.ela', method='ffe')
+            scene.tell('emit', 'stress', 'ball', 'z>40')
+            scene.tell('displace', 'ball', 'near:0,0,50,9', 0, 0, 1)
+            answer = scene.step(0.1)
+            self.assertGreater(answer.stress['ball'].von_mises.max(), 0)
+            self.assertEqual(answer.stress['ball'].tensors.shape, (len(answer.stress['ball'].nodes), 6))
+            self.assertTrue(0 < answer.estimates['ball'].relative < 2)
+        sphere_model()
+        with gewebe.Scene() as scene:
+            scene.add('ball', 'ball.ela', method='ffe')
+            scene.step(0.1)
+            scene.tell('cut', 'ball', 'springs', 'z>45')
+            self.assertEqual(scene.step(0.1).events[0][:2], ['cut', 'ball'])
+            with self.assertRaisesRegex(gewebe.Error, 'surface of ball is unknown'):
+                scene.picture()
+
+    def test_lines_are_made_of_words(self):
+        self.assertEqual(gewebe.scene_line('force', 'o', numpy.array([0.1, 2]), 3, 1e-20, Path('a b.ela')), 'force o 0.1 2.0 3 1e-20 "a b.ela"')
+        for wrong in (math.nan, True, 'a\nb', 'a"b'):
+            with self.assertRaises(ValueError):
+                gewebe.scene_line('step', wrong)
+        with self.assertRaisesRegex(gewebe.Error, 'no answer to a step'):
+            gewebe.read_answers([['sync', '0']])
+
     def test_a_run_that_can_not_begin(self):
         with self.assertRaisesRegex(gewebe.Error, 'nonsense') as caught:
             gewebe.drive('--nonsense')
