@@ -97,8 +97,9 @@ CurveAxis round_axis(double min, double max, std::size_t count) {
   const double first = std::floor(min / step + 1e-9), last = std::ceil(max / step - 1e-9);
   CurveAxis axis;
   const bool exponent = decimals > 6 || last * step >= 1e7 || first * step <= -1e7;
-  for (double k = first; k <= last; ++k) {
-    axis.marks.push_back(k * step + 0.0);
+  const auto marks = static_cast<std::size_t>(last - first) + 1;
+  for (std::size_t k = 0; k < marks; ++k) {
+    axis.marks.push_back((first + static_cast<double>(k)) * step + 0.0);
     axis.texts.push_back(mark_text(axis.marks.back(), std::max(decimals, 0), exponent));
   }
   axis.min = axis.marks.front();

@@ -1,7 +1,9 @@
 #include "tools/render/legend.h"
 
+#include "tests/unit/larger.h"
 #include "texture/lettering.h"
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <gtest/gtest.h>
@@ -25,14 +27,7 @@ std::array<std::size_t, 4> changed(const Image& image) {
   for (std::size_t y = 0; y < image.height; ++y)
     for (std::size_t x = 0; x < image.width; ++x)
       if (pixel(image, x, y) != PixelColor{128, 128, 128}) {
-        if (x < box[0])
-          box[0] = x;
-        if (x > box[1])
-          box[1] = x;
-        if (y < box[2])
-          box[2] = y;
-        if (y > box[3])
-          box[3] = y;
+        box = {std::min(box[0], x), std::max(box[1], x), std::min(box[2], y), std::max(box[3], y)};
       }
   return box;
 }
@@ -126,10 +121,8 @@ TEST(Legend, UniformRampsGetLighterInEqualSteps) {
     for (int k = 0; k < 16; ++k) {
       const double step =
           lightness(ramp_color(ramp, (k + 1) / 16.0)) - lightness(ramp_color(ramp, k / 16.0));
-      if (step < least)
-        least = step;
-      if (step > greatest)
-        greatest = step;
+      least = test::smaller(least, step);
+      greatest = test::larger(greatest, step);
     }
     const bool uniform = least > 0 && greatest < 2 * least;
     EXPECT_EQ(uniform, name != "rainbow") << name << " " << least << " " << greatest;

@@ -6,6 +6,8 @@
 #include "formats/stream/stream.h"
 #include "tools/cli/cli.h"
 
+#include <algorithm>
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <string>
@@ -33,23 +35,21 @@ std::vector<std::string> names_in(std::string_view list) {
   return names;
 }
 
-/// Size of the drawing: as asked, or the default of its kind. \throw UsageError
+/// Size of the drawing: that of --size, or the default of its kind. \throw UsageError
 std::vector<double> drawing_size(const PlotArguments& in, Kind kind) {
   const bool ascii = kind == Kind::ascii;
-  const std::vector<double> smallest =
-                                ascii ? std::vector<double>{40, 10} : std::vector<double>{200, 150},
-                            largest = ascii ? std::vector<double>{1000, 1000}
-                                            : std::vector<double>{10000, 10000},
-                            usual =
-                                ascii ? std::vector<double>{78, 24} : std::vector<double>{800, 500};
+  const std::array<std::int64_t, 2> smallest =
+      ascii ? std::array<std::int64_t, 2>{40, 10} : std::array<std::int64_t, 2>{200, 150};
+  const std::int64_t largest = ascii ? 1000 : 10000;
   if (in.size.empty())
-    return usual;
+    return ascii ? std::vector<double>{78, 24} : std::vector<double>{800, 500};
   for (std::size_t k = 0; k < 2; ++k)
-    if (!(in.size[k] >= smallest[k] && in.size[k] <= largest[k]) ||
+    if (!(in.size[k] >= static_cast<double>(smallest[k]) &&
+          in.size[k] <= static_cast<double>(largest)) ||
         in.size[k] != static_cast<double>(static_cast<std::int64_t>(in.size[k])))
-      throw UsageError("--size: expected two whole numbers of " + std::to_string(int(smallest[0])) +
-                       "," + std::to_string(int(smallest[1])) + " to " +
-                       std::to_string(int(largest[0])) + "," + std::to_string(int(largest[1])));
+      throw UsageError("--size: expected two whole numbers of " + std::to_string(smallest[0]) +
+                       "," + std::to_string(smallest[1]) + " to " + std::to_string(largest) + "," +
+                       std::to_string(largest));
   return in.size;
 }
 

@@ -39,11 +39,13 @@ void draw_bar(Image& picture, const Layout& at, const LegendBar& bar) {
                  bar.title, at.style);
   const double rim = std::max(1.0, std::round(at.letter / 10));
   fill_rectangle(picture, {left - rim, top - rim}, {right + rim, bottom + rim}, at.style.color);
-  for (double row = 0; row < long_side; ++row) {
+  const auto rows = static_cast<std::size_t>(long_side);
+  for (std::size_t k = 0; k < rows; ++k) {
+    const auto row = static_cast<double>(k);
     const std::array<double, 3> mixed = ramp_color(bar.ramp, 1 - (row + 0.5) / long_side);
     PixelColor color{};
-    for (std::size_t k = 0; k < 3; ++k)
-      color[k] = static_cast<std::uint8_t>(std::floor(mixed[k] + 0.5));
+    for (std::size_t c = 0; c < 3; ++c)
+      color[c] = static_cast<std::uint8_t>(std::floor(mixed[c] + 0.5));
     fill_rectangle(picture, {left, top + row}, {right, top + row + 1}, color);
   }
   const CurveAxis axis = round_axis(bar.range[0], bar.range[1], 5);
