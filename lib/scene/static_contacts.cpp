@@ -10,7 +10,9 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <iterator>
 #include <map>
+#include <memory>
 #include <numbers>
 #include <optional>
 #include <set>
@@ -29,7 +31,7 @@ bool is_static(const Object& object) {
 
 /// Whether contact of the object has something to do with instruments.
 bool near_instrument(World& w, std::size_t object, std::size_t k) {
-  const Box3& box = shown_box(w, object);
+  const Box3 box = contact_box(w, object);
   const InstrumentShape& shape = w.now.instruments[k].shape;
   const double margin = near_part * box.longest_side();
   for (std::size_t p = 0; p < w.now.poses.size(); ++p) {
@@ -148,10 +150,14 @@ bool needs_showing(World& w, const Group& group) {
 class GroupStep {
 public:
   GroupStep(World& w, const Group& group) : w_(w), group_(group) {
+    if (group.parts.statics.size() == 1)
+      reach_ = contact_reach(w, group.parts.statics[0]);
     for (const std::size_t index : group.parts.statics) {
       Object& object = w.now.objects[index];
+      if (!reach_)
+        shape_in_step(w, object);
       before_.push_back(*object.shown.load);
-      shape_.push_back(stood_shape(w, object));
+      shape_.push_back(reach_ ? std::vector<double>() : stood_shape(w, object));
       begin_showing(w, object);
       load_shown(w, object);
     }
@@ -166,10 +172,14 @@ public:
       Object& object = w_.now.objects[index];
       Shown& shown = object.shown;
       shown.contact = object.touching;
-      shown.shaped = true;
-      warn_of_range(w_, object);
-      if (object.statics.made())
-        shown.forces = static_forces(object);
+      if (reach_ && !shown.shaped) {
+        warn_of_range(w_, object, shown.largest);
+      } else {
+        shown.shaped = true;
+        warn_of_range(w_, object);
+        if (object.statics.made())
+          shown.forces = static_forces(object);
+      }
       at_object(w_, object, [&] { end_showing(w_, object); });
     }
   }
@@ -180,6 +190,8 @@ private:
     Pose from, to;
     double duration = 0; ///< of a coupled one
   };
+  /// Instruments reach more of the surface than was looked at.
+  struct MorePart {};
 
   /// From one moment of the poses to the next. \param begin, end  shares of the load's way
   void pass(std::size_t moment, double begin, double end) {
@@ -216,6 +228,110 @@ private:
     }
   }
 
+  /// Where instruments are in a part of that way that ends at `to`.
+  std::vector<Box3> boxes_of(const IslandParts& parts, std::span<const Pose> start, double to,
+                             double room) const {
+    std::vector<Box3> boxes;
+    for (std::size_t n = 0; n < legs_.size(); ++n)
+      boxes.push_back(box_with_room(w_.now.instruments[parts.instruments[n]].shape, start[n],
+                                    between(legs_[n].from, legs_[n].to, to), room));
+    return boxes;
+  }
+
+  static Box3 box_with_room(const InstrumentShape& shape, const Pose& from, const Pose& to,
+                            double room) {
+    Box3 box = box_between(shape, from, to);
+    box.min -= Vec3{room, room, room};
+    box.max += Vec3{room, room, room};
+    return box;
+  }
+
+  /// Tiles of the object that instruments may reach, and those that are in contact.
+  std::vector<std::uint32_t> reached(std::span<const Box3> boxes,
+                                     std::span<const NodalContactForce> contact) {
+    const std::vector<double>& bounds =
+        bounds_under(w_, group_.parts.statics[0], *reach_, contact);
+    std::vector<std::uint32_t> nodes;
+    for (const NodalContactForce& f : contact)
+      nodes.push_back(f.node);
+    const std::vector<std::uint32_t> near = reach_->tiles.near(boxes, bounds),
+                                     with = reach_->tiles.with(nodes);
+    std::vector<std::uint32_t> all;
+    std::ranges::set_union(near, with, std::back_inserter(all));
+    return all;
+  }
+
+  /// As go(), with the part of the object's surface that instruments reach: more of it where they
+  /// turn out to reach more.
+  void go_on_part(const IslandParts& parts, IslandCache& cache, std::span<const Pose> start,
+                  double from, double to) {
+    const contact::Parameters parameters;
+    const double edge = cache.motion->island().edge, nearest = cache.motion->activation_distance();
+    std::vector<std::uint32_t> tiles =
+        reached(boxes_of(parts, start, to, nearest + parameters.margin * edge),
+                w_.now.objects[parts.statics[0]].touching);
+    for (bool whole = false; !whole;) {
+      if (tiles.empty())
+        tiles.push_back(0); // an island has some surface
+      PartIsland& island = part_island(cache, reach_, tiles);
+      IslandMembers members;
+      StaticMember& object = members.statics.emplace_back(
+          w_, parts.statics[0], island.part.surface, cache.instrument_of_piece);
+      members.all.push_back(&object);
+      for (std::size_t n = 0; n < legs_.size(); ++n) {
+        InstrumentMember& tool = members.instruments.emplace_back(w_, parts.instruments[n],
+                                                                  cache.surfaces[n], start[n]);
+        members.all.push_back(&tool);
+        tool.set_target(between(legs_[n].from, legs_[n].to, to), legs_[n].duration * (to - from));
+      }
+      const Load& load = before_[0]; // it does not change
+      object.set_load(load);
+      std::vector<std::uint32_t> more;
+      object.take_part(island.part, load, [&](std::span<const NodalContactForce> contact) {
+        std::vector<Box3> boxes;
+        for (std::size_t n = 0; n < legs_.size(); ++n)
+          boxes.push_back(box_with_room(w_.now.instruments[parts.instruments[n]].shape, start[n],
+                                        members.instruments[n].end_pose(), nearest));
+        more = reached(boxes, contact);
+        if (!std::ranges::includes(tiles, more))
+          throw MorePart();
+      });
+      try {
+        advance_members(*island.motion, members);
+        whole = true;
+      } catch (const MorePart&) {
+        std::vector<std::uint32_t> all;
+        std::ranges::set_union(tiles, more, std::back_inserter(all));
+        tiles = std::move(all);
+      }
+    }
+  }
+
+  /// \param share  of the load's way, at the end
+  void go_on_whole(const IslandParts& parts, IslandCache& cache, std::span<const Pose> start,
+                   double from, double to, double share) {
+    IslandMembers members;
+    make_members(w_, parts, cache, start, members);
+    for (std::size_t n = 0; n < legs_.size(); ++n)
+      members.instruments[n].set_target(between(legs_[n].from, legs_[n].to, to),
+                                        legs_[n].duration * (to - from));
+    for (std::size_t k = 0; k < parts.statics.size(); ++k)
+      members.statics[k].set_load(
+          load_between(before_[k], *w_.now.objects[parts.statics[k]].shown.load, shape_[k], share));
+    advance_members(*cache.motion, members);
+  }
+
+  void advance_members(contact::IslandMotion& motion, const IslandMembers& members) {
+    const double now = w_.now.clock.time;
+    try {
+      motion.advance(members.all, now, now, w_.context);
+    } catch (...) {
+      count_contact(w_, motion.take_report());
+      throw;
+    }
+    count_contact(w_, motion.take_report());
+  }
+
   /// A part of that way, in halves where contact is not solved.
   void go(const IslandParts& parts, IslandCache& cache, double from, double to, double begin,
           double end, int halvings) {
@@ -225,22 +341,13 @@ private:
       const Pose pose = between(legs_[n].from, legs_[n].to, from);
       start.push_back(i.coupled && !i.stepped ? Pose{i.coupled->place, pose.turn} : pose);
     }
-    IslandMembers members;
-    make_members(w_, parts, cache, start, members);
-    for (std::size_t n = 0; n < legs_.size(); ++n)
-      members.instruments[n].set_target(between(legs_[n].from, legs_[n].to, to),
-                                        legs_[n].duration * (to - from));
-    const double share = begin + to * (end - begin);
-    for (std::size_t k = 0; k < parts.statics.size(); ++k)
-      members.statics[k].set_load(
-          load_between(before_[k], *w_.now.objects[parts.statics[k]].shown.load, shape_[k], share));
-    const double now = w_.now.clock.time;
     try {
-      cache.motion->advance(members.all, now, now, w_.context);
-      count_contact(w_, cache.motion->take_report());
+      if (reach_)
+        go_on_part(parts, cache, start, from, to);
+      else
+        go_on_whole(parts, cache, start, from, to, begin + to * (end - begin));
       return;
     } catch (const contact::NotSolved& error) {
-      count_contact(w_, cache.motion->take_report());
       if (halvings == 0 || dynamic_cast<const contact::IntersectsAtStart*>(&error) != nullptr)
         fail_contact(w_, parts, error);
     }
@@ -252,6 +359,7 @@ private:
 
   World& w_;
   const Group& group_;
+  std::shared_ptr<ContactReach> reach_; ///< of the only object, if contact is found on a part of it
   std::vector<Load> before_;
   std::vector<std::vector<double>> shape_;
   std::vector<Leg> legs_;
@@ -288,10 +396,8 @@ std::vector<ObjectPair> show_groups(World& w, const std::set<ObjectPair>& late,
     for (const std::size_t index : {a, b})
       swept[index] = shown_box(w, index);
   for (const Group& group : groups) {
-    for (const std::size_t index : group.parts.statics) {
-      shape_in_step(w, w.now.objects[index]);
+    for (const std::size_t index : group.parts.statics)
       shown[index] = 1;
-    }
     for (const std::size_t k : group.parts.instruments)
       followed[k] = 1;
     if (needs_showing(w, group)) {
