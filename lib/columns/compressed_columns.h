@@ -83,7 +83,8 @@ public:
   /// with the bits of add() to zeros. \pre as add
   std::vector<double> sum_at(std::span<const std::uint32_t> clusters,
                              std::span<const NodeVector> forces, const Context& context) const;
-  /// Bound of the size of C f along an axis, by cluster. It costs much less than the sum. \pre as add
+  /// Bound of the size of C f along an axis, by cluster. It costs much less than the sum. \pre as
+  /// add
   std::vector<double> bounds(std::span<const NodeVector> forces, const Context& context) const;
 
   /// Number of values that a sum with forces at these nodes reads from memory.

@@ -57,7 +57,8 @@ Compliance::Compliance(const Model& model, std::shared_ptr<ComplianceSource> sou
                        const Context& context, bool bounded, bool may_be_free)
     : axes_(3 * model.nodes.size()), source_(source ? std::move(source) : compliance_of_model()),
       compressed_(source_->columns() != nullptr ? source_->columns()->compressed() : nullptr),
-      whole_(compressed_ != nullptr && have_all_columns(model, *compressed_) ? compressed_ : nullptr),
+      whole_(compressed_ != nullptr && have_all_columns(model, *compressed_) ? compressed_
+                                                                             : nullptr),
       rows_(3 * row_nodes_of(model, *source_)), context_(context),
       cache_(rows_ / 3, source_->columns(), columns_of(rows_), column_bytes(context), bounded) {
   context_.progress = nullptr;

@@ -23,9 +23,10 @@ bool is_sum_of_forces(const World& w, std::size_t index) {
   if (!load.displacement.empty() || load.gravity != Vec3{} || !load.pressure.empty() ||
       !load.force_period.empty() || !shown.displacement.empty() || shown.force != load.force)
     return false;
-  return std::ranges::none_of(
-             w.now.contacts,
-             [&](const ContactRule& rule) { return rule.object == index || rule.other == index; }) &&
+  return std::ranges::none_of(w.now.contacts,
+                              [&](const ContactRule& rule) {
+                                return rule.object == index || rule.other == index;
+                              }) &&
          !is_held_altogether(object);
 }
 
@@ -36,9 +37,9 @@ std::shared_ptr<ContactReach> contact_reach(World& w, std::size_t index) {
     return nullptr;
   Object& object = w.now.objects[index];
   const NodeClusters* const clusters = solver_of(w, object).clusters();
-  if (clusters == nullptr ||
-      std::ranges::any_of(object.load->force,
-                          [&](const auto& f) { return f.first >= clusters->node.size(); }))
+  if (clusters == nullptr || std::ranges::any_of(object.load->force, [&](const auto& f) {
+        return f.first >= clusters->node.size();
+      }))
     return nullptr;
   if (!object.statics.reach)
     object.statics.reach =

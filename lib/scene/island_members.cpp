@@ -168,8 +168,7 @@ contact::ContactBody& StaticMember::begin(double /*from*/, double to, const Cont
         StaticContactState{&object.model(), &surface_, &load_, part_->stood, part.place,
                            std::move(last),
                            [this, &object, &part](std::span<const double> u) {
-                             at_object(w_, object,
-                                       [&] { require_bounded(object, u, part.node); });
+                             at_object(w_, object, [&] { require_bounded(object, u, part.node); });
                            }},
         [this, &object]() -> Elastostatic& { return solver_of(w_, object); }, part.clusters);
     return *body_;

@@ -88,7 +88,8 @@ void require_bounded(Object& object, std::span<const double> displacement,
   const double max = displacement_limit(object);
   for (std::size_t k = 0; k < displacement.size(); ++k)
     if (!(std::abs(displacement[k]) <= max))
-      throw Error("node " + std::to_string(nodes.empty() ? k / 3 : nodes[k / 3]) + " is displaced by over " + number_text(max) +
+      throw Error("node " + std::to_string(nodes.empty() ? k / 3 : nodes[k / 3]) +
+                  " is displaced by over " + number_text(max) +
                   " mm, a million times the size of the object, expected a smaller load or "
                   "timestep");
 }

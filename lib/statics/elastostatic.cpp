@@ -533,9 +533,8 @@ std::vector<NodeVector> with_columns(const CompressedColumns& columns,
 
 } // namespace
 
-std::vector<double>
-Elastostatic::displacement_of_clusters(std::span<const std::uint32_t> clusters,
-                                       std::span<const NodeVector> forces) {
+std::vector<double> Elastostatic::displacement_of_clusters(std::span<const std::uint32_t> clusters,
+                                                           std::span<const NodeVector> forces) {
   const CompressedColumns& columns = *state_->compliance.compressed_rows();
   return columns.sum_at(clusters, with_columns(columns, forces), state_->context);
 }

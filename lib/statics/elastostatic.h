@@ -148,9 +148,9 @@ public:
   /// Clusters of neighbours among the first m nodes, see surface_displacement, where parts of a
   /// shape can be computed alone; else null. It does not change.
   const NodeClusters* clusters() const noexcept;
-  /// Displacement of the nodes of some clusters under forces, cluster by cluster: 3 numbers for each
-  /// node. It neither uses nor changes the last load. \pre clusters(); forces at the first m nodes,
-  /// ascending   \throw Error if columns can't be read
+  /// Displacement of the nodes of some clusters under forces, cluster by cluster: 3 numbers for
+  /// each node. It neither uses nor changes the last load. \pre clusters(); forces at the first m
+  /// nodes, ascending   \throw Error if columns can't be read
   std::vector<double> displacement_of_clusters(std::span<const std::uint32_t> clusters,
                                                std::span<const NodeVector> forces);
   /// Bound of the length of these displacements, by cluster, mm. \pre as displacement_of_clusters

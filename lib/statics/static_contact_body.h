@@ -23,7 +23,7 @@ namespace gewebe {
 struct StaticContactState {
   const Model* model = nullptr;
   const contact::ModelSurface* surface = nullptr;
-  const Load* load = nullptr;                 ///< at the end of the step
+  const Load* load = nullptr; ///< at the end of the step
   /// At its beginning, of the surface: of node i at 3 i, or of vertex k at 3 place[k] where given.
   std::span<const double> displacement{};
   std::span<const std::uint32_t> place{};

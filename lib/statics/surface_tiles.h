@@ -30,7 +30,8 @@ public:
 
   /// Tiles that may meet one of these boxes, ascending.
   /// \param bounds  by cluster: of the displacement of its nodes, mm
-  std::vector<std::uint32_t> near(std::span<const Box3> boxes, std::span<const double> bounds) const;
+  std::vector<std::uint32_t> near(std::span<const Box3> boxes,
+                                  std::span<const double> bounds) const;
   /// Tiles that hold the vertices of these nodes, ascending.
   std::vector<std::uint32_t> with(std::span<const std::uint32_t> nodes) const;
   /// Box that holds the surface.
