@@ -170,7 +170,8 @@ Kind kind_from_magic(std::string_view bytes) {
   if (bytes.size() >= 348 &&
       (bytes.substr(344, 4) == "n+1\0"sv || bytes.substr(344, 4) == "ni1\0"sv))
     return Kind::nifti;
-  if (bytes.starts_with("$MeshFormat") || bytes.starts_with("$Comments"))
+  if (bytes.starts_with("$MeshFormat") || bytes.starts_with("$Comments") ||
+      bytes.starts_with("$NOD"))
     return Kind::msh;
   if (bytes.starts_with("# vtk DataFile Version"))
     return Kind::vtk;

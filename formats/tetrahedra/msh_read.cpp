@@ -4,7 +4,7 @@
 #include <map>
 #include <optional>
 // Based on: Geuzaine, Remacle, Gmsh reference manual 4.11, MSH file format, version 4.1, and
-// legacy version 2.2.
+// legacy versions 1 and 2.2.
 
 namespace gewebe::tet {
 namespace {
@@ -101,18 +101,25 @@ public:
          section = in_.words().word())
       read_section(section);
     if (!has_format_)
-      in_.words().fail("no Gmsh mesh, expected $MeshFormat");
+      in_.words().fail("no Gmsh mesh, expected $MeshFormat or $NOD");
     if (!has_nodes_ || !has_elements_)
       in_.words().fail(std::string("the file ends without ") +
-                       (has_nodes_ ? "$Elements" : "$Nodes") + ", expected them");
+                       (version1_    ? has_nodes_ ? "$ELM" : "$NOD"
+                        : has_nodes_ ? "$Elements"
+                                     : "$Nodes") +
+                       ", expected them");
     return finish();
   }
 
 private:
   void read_section(std::string_view section) {
+    if (version1_ && section != "$NOD" && section != "$ELM")
+      in_.words().fail(quoted(section) + " in a file of version 1, expected $NOD or $ELM");
     if (section[0] != '$' || section.size() < 2)
       in_.words().fail(quoted(section) + ", expected a section, such as $Nodes");
     const std::string end = "$End" + std::string(section.substr(1));
+    if (section == "$NOD" || section == "$ELM")
+      return read_section1(section);
     if (section == "$Comments") {
       in_.skip_to(end);
     } else if (section == "$MeshFormat") {
@@ -153,6 +160,45 @@ private:
     }
     if (section != "$Comments" && in_.words().word() != end)
       in_.words().fail("expected " + end);
+  }
+
+  /// Version 1 has text without $MeshFormat.
+  void read_section1(std::string_view section) {
+    const bool nodes = section == "$NOD";
+    if (has_format_ && !version1_)
+      in_.words().fail(std::string(section) + " of version 1 behind $MeshFormat, expected " +
+                       (nodes ? "$Nodes" : "$Elements"));
+    if (nodes ? has_nodes_ : has_elements_)
+      in_.words().fail("a second " + std::string(section) + ", expected one");
+    if (!nodes && !has_nodes_)
+      in_.words().fail("$ELM before $NOD, expected $NOD first");
+    has_format_ = version1_ = true;
+    (nodes ? has_nodes_ : has_elements_) = true;
+    if (nodes) {
+      read_nodes2(); // the same lines
+      if (const auto twice = tags_.sort())
+        in_.words().fail("two nodes of number " + std::to_string(*twice) + ", expected one");
+    } else {
+      read_elements1();
+    }
+    const std::string end = nodes ? "$ENDNOD" : "$ENDELM";
+    if (in_.words().word() != end)
+      in_.words().fail("expected " + end);
+  }
+
+  void read_elements1() {
+    const std::uint64_t elements = in_.words().count("the number of elements");
+    in_.words().require(elements, 6, "elements");
+    for (std::uint64_t n = 0; n < elements; ++n) {
+      in_.words().count("an element's number");
+      const Type& type = type_of(in_.words().integer("a type"));
+      const std::int64_t physical = in_.integer("a physical region"),
+                         entity = in_.integer("an elementary region");
+      if (const std::uint64_t nodes = in_.words().count("the number of nodes"); nodes != type.nodes)
+        in_.words().fail(std::to_string(nodes) + " nodes of an element of type " +
+                         std::to_string(type.number) + ", expected " + std::to_string(type.nodes));
+      add_element(type, physical, entity);
+    }
   }
 
   /// Always text. Only one of the names matters.
@@ -389,6 +435,7 @@ private:
   std::map<std::int64_t, std::int64_t> physical_of_;
   std::optional<std::int64_t> group_of_0_;
   bool has_format_ = false, has_nodes_ = false, has_elements_ = false;
+  bool version1_ = false;
 };
 
 } // namespace

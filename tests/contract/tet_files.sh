@@ -136,6 +136,7 @@ test_gmsh_reads_our_tetrahedra_and_we_read_its() {
     for suffix in msh 4.msh mesh; do
       gmsh $name.$suffix -0 -save -bin -format msh22 -o $name.$suffix.again.msh >gmsh.log 2>&1 || fail "$(<gmsh.log)"
     done
+    gmsh $name.4.msh -0 -save -format msh1 -o other/${name}_text_msh1.msh >gmsh.log 2>&1 || fail "$(<gmsh.log)"
     for suffix in msh22 msh41; do
       gmsh $name.4.msh -0 -save -format $suffix -o other/${name}_text_$suffix.msh >gmsh.log 2>&1 || fail "$(<gmsh.log)"
       gmsh $name.4.msh -0 -save -bin -format $suffix -o other/${name}_$suffix.msh >gmsh.log 2>&1 || fail "$(<gmsh.log)"
@@ -157,7 +158,7 @@ for name in 'linear', 'quadratic':
 def rounded(cells):
     return sorted((tuple(tuple(float('%.9g' % (x + 0.)) if abs(x) > 1e-12 else 0. for x in p) for p in n), m) for n, m in cells)
 names = glob.glob('other/*.m*sh')
-assert len(names) == 9, names
+assert len(names) == 11, names
 for name in names:
     found, expected = tetgen(name), tetgen(name[6:].split('_')[0])
     same(name, *((rounded(found), rounded(expected)) if 'text' in name else (found, expected)))
