@@ -3,6 +3,7 @@
 #include "base/error.h"
 #include "formats/stream/file_names.h"
 #include "formats/volume/label_volume_internal.h"
+#include "text/nearest_word.h"
 #include "text/number_text.h"
 
 #include <algorithm>
@@ -267,14 +268,43 @@ LabelVolume read_radiology(ByteSource& source, const std::string& name,
   else
     throw Error(name, std::string(request.grey != nullptr ? "is no volume" : "is no label volume") +
                           ", expected NIfTI, NRRD, MetaImage or INR");
-  for (const LabelRange& range : request.labels)
+  for (const LabelRange& asked : request.labels) {
+    const LabelRange range = numbered_label(asked, volume.names, name);
     if (std::none_of(volume.labels.begin(), volume.labels.end(), [&](const auto& label) {
           return label.first >= range.first && label.first <= range.last;
         }))
       throw Error(name, "has no label " + std::to_string(range.first) +
                             (range.last == range.first ? "" : " to " + std::to_string(range.last)) +
                             ", expected some of " + list_of(volume.labels));
+  }
   return volume;
+}
+
+LabelRange numbered_label(const LabelRange& request,
+                          const std::vector<std::pair<std::int64_t, std::string>>& names,
+                          const std::string& file) {
+  if (request.name.empty())
+    return request;
+  if (names.empty())
+    throw Error(file,
+                "has no names of labels, expected a number in place of '" + request.name + "'");
+  std::vector<std::string> known;
+  std::optional<std::int64_t> found;
+  for (const auto& [label, name] : names) {
+    known.push_back(name);
+    if (name != request.name)
+      continue;
+    if (found)
+      throw Error(file, "has two labels '" + name + "', expected a number instead");
+    found = label;
+  }
+  if (found)
+    return {*found, *found, {}};
+  std::string list;
+  for (const std::string& name : known)
+    list += (list.empty() ? "" : ", ") + name;
+  throw Error(file, "has no label '" + request.name + "'" + suggestion(request.name, known) +
+                        ", expected some of " + list);
 }
 
 // ---- what the formats share

@@ -32,9 +32,11 @@
 
 namespace gewebe {
 
-/// Requested labels: one where both are equal, or those in between that the volume holds.
+/// Requested labels: one where both are equal, or those in between that the volume holds; or the
+/// one of a name, where that is not empty.
 struct LabelRange {
   std::int64_t first = 0, last = 0;
+  std::string name{};
 };
 
 struct LabelVolume {
@@ -43,6 +45,8 @@ struct LabelVolume {
   std::string format;       ///< "NIfTI-1", "NIfTI-2", "NRRD", "MetaImage", "INR"
   std::vector<std::pair<std::int64_t, std::uint64_t>>
       labels; ///< all values that the file holds, ascending, and how often
+  /// Names of labels, as 3D Slicer writes them into .seg.nrrd; in the order of its segments.
+  std::vector<std::pair<std::int64_t, std::string>> names;
   std::vector<std::string> warnings;
 };
 
@@ -55,8 +59,8 @@ using LabelCheck = std::function<void(const LabelMask& without_bits)>;
 /// kept.
 /// \throw Error with the place if it is none of these, is cut off, goes on beyond its end, or has a
 /// value that is no whole number; if the affine is singular; if none of a range of `labels` occurs
-/// (the message names those that do); if more than context.max_memory would be needed; or what
-/// `check` throws
+/// (the message names those that do); if a name is requested that the file has not, or has twice;
+/// if more than context.max_memory would be needed; or what `check` throws
 LabelVolume read_label_volume(Input& input, const std::vector<LabelRange>& labels,
                               const Context& context, const LabelCheck& check = {});
 

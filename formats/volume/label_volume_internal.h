@@ -109,6 +109,12 @@ struct LabelRequest {
   VoxelLayout* layout = nullptr; ///< then no voxel is read
 };
 
+/// The request with its number in place of its name, if it has one. \throw Error, place = file, if
+/// no label or two have this name
+LabelRange numbered_label(const LabelRange& request,
+                          const std::vector<std::pair<std::int64_t, std::string>>& names,
+                          const std::string& file);
+
 /// Reads a volume of any of the formats for a request.
 LabelVolume read_radiology(ByteSource& source, const std::string& name,
                            const LabelRequest& request);

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <array>
 #include <cctype>
+#include <charconv>
 #include <cmath>
 #include <map>
 
@@ -32,15 +33,47 @@ public:
     }
   }
 
+  /// Names of segments that have a value, as 3D Slicer writes them.
+  std::vector<std::pair<std::int64_t, std::string>> names() const {
+    std::vector<std::pair<std::int64_t, std::string>> all;
+    for (const auto& [number, segment] : segments_)
+      if (segment.label && !segment.name.empty())
+        all.emplace_back(*segment.label, segment.name);
+    return all;
+  }
+
 private:
+  struct Segment {
+    std::string name;
+    std::optional<std::int64_t> label;
+  };
+
+  /// "Segment3_Name" and "Segment3_LabelValue"; other keys are passed over.
+  void add_segment(std::string_view key, std::string_view value, const std::string& place) {
+    constexpr std::string_view start = "Segment";
+    const std::size_t mid = key.find('_');
+    std::uint32_t number = 0;
+    if (!key.starts_with(start) || mid == std::string_view::npos)
+      return;
+    const char* const end = key.data() + mid;
+    const auto read = std::from_chars(key.data() + start.size(), end, number);
+    if (read.ec != std::errc{} || read.ptr != end)
+      return;
+    if (key.substr(mid) == "_Name")
+      segments_[number].name = value;
+    else if (key.substr(mid) == "_LabelValue")
+      segments_[number].label = whole_of(place, trimmed(value));
+  }
+
   void add(const std::string& line, const std::string& place) {
     if (line.starts_with('#'))
       return;
     const std::size_t colon = line.find(':');
     if (colon == std::string::npos)
       throw Error(place, quoted(line) + ", expected 'field: value'");
-    if (colon + 1 < line.size() && line[colon + 1] == '=')
-      return; // key:=value of the user's own
+    if (colon + 1 < line.size() && line[colon + 1] == '=') // key:=value of the user's own
+      return add_segment(std::string_view(line).substr(0, colon),
+                         std::string_view(line).substr(colon + 2), place);
     std::string key = line.substr(0, colon);
     std::transform(key.begin(), key.end(), key.begin(),
                    [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
@@ -89,6 +122,8 @@ private:
              .second)
       throw Error(place, "a second field '" + key + "', expected one");
   }
+
+  std::map<std::uint32_t, Segment> segments_;
 };
 
 ScalarType scalar_type(const HeaderField& field) {
@@ -343,14 +378,21 @@ LabelVolume read_nrrd(BufferedBytes& bytes, const LabelRequest& request) {
   layout.big_endian = big_endian_of(fields, layout.type);
   layout.transform = affine(fields, name, directions, axes, head);
 
+  std::vector<LabelRange> labels;
+  for (const LabelRange& range : request.labels)
+    labels.push_back(numbered_label(range, fields.names(), name));
+  const LabelRequest numbered{labels,      request.context, request.check, request.side_files,
+                              request.all, request.grey,    request.layout};
+
   LabelVolume volume;
   if (const HeaderField* const file = fields.find("data file")) {
-    volume = read_side_file(name, *file, request, [&](BufferedBytes& data) {
-      return read_data(data, fields, layout, request);
+    volume = read_side_file(name, *file, numbered, [&](BufferedBytes& data) {
+      return read_data(data, fields, layout, numbered);
     });
   } else {
-    volume = read_data(bytes, fields, layout, request);
+    volume = read_data(bytes, fields, layout, numbered);
   }
+  volume.names = fields.names();
   volume.format = "NRRD";
   volume.warnings = head.warnings;
   return volume;

@@ -36,7 +36,7 @@ MaterialVolumes::MaterialVolumes(const MeshArguments& arguments) {
       throw Error(input.name(), "is no label volume, expected one for --label");
   }
   if (!arguments.labels.empty())
-    wanted = labels_from_text(arguments.labels, "whole numbers");
+    wanted = labels_from_text(arguments.labels, "whole numbers, or names");
 }
 
 void MaterialVolumes::read(cli::Run& run, Space space) {

@@ -33,7 +33,7 @@ void check(const MeshArguments& arguments) {
   if (!arguments.labels.empty() && arguments.materials.empty())
     throw UsageError("--label is for --materials, expected both");
   if (!arguments.labels.empty())
-    (void)labels_from_text(arguments.labels, "whole numbers");
+    (void)labels_from_text(arguments.labels, "whole numbers, or names");
   const auto refuse = [&](bool given, const char* option) {
     if (arguments.tets && given)
       throw UsageError(std::string(option) + " is for surfaces, expected it without --tets");

@@ -21,6 +21,12 @@ std::vector<LabelRange> labels_from_text(const std::string& text, const char* ex
     const std::string_view word = std::string_view(text).substr(begin, comma - begin);
     const char* const end = word.data() + word.size();
     LabelRange& range = labels.emplace_back();
+    begin = comma + 1;
+    if (!word.empty() &&
+        std::string_view("-+.0123456789").find(word[0]) == std::string_view::npos) {
+      range.name = word;
+      continue;
+    }
     std::from_chars_result read = std::from_chars(word.data(), end, range.first);
     range.last = range.first;
     if (read.ec == std::errc{} && read.ptr != end && *read.ptr == '-')
@@ -29,7 +35,6 @@ std::vector<LabelRange> labels_from_text(const std::string& text, const char* ex
       throw UsageError("--label: '" + std::string(word) + "', expected " + expected);
     if (range.last < range.first)
       throw UsageError("--label: '" + std::string(word) + "', expected the smaller number first");
-    begin = comma + 1;
   }
   return labels;
 }
@@ -60,7 +65,10 @@ void list_labels(cli::Run& run, const std::string& path, const VolumeOutput& to)
     const double mm3 = static_cast<double>(voxels) * spacing.x * spacing.y * spacing.z;
     std::array<char, 32> size{};
     (void)std::snprintf(size.data(), size.size(), "%.6g", mm3);
-    text += std::to_string(label) + " " + std::to_string(voxels) + " " + size.data() + "\n";
+    text += std::to_string(label) + " " + std::to_string(voxels) + " " + size.data();
+    const auto named =
+        std::ranges::find(volume.names, label, [](const auto& n) { return n.first; });
+    text += named == volume.names.end() ? "\n" : " " + named->second + "\n";
   }
   output.write(text);
   output.commit();
