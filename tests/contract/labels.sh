@@ -20,6 +20,26 @@ test_organs_of_a_ct_keep_volume_and_are_closed() {
   done
 }
 
+test_pynrrd_writes_segments_with_names() {
+  python3 -c 'import nrrd' 2>/dev/null || skip 'no pynrrd for python3'
+  python3 - <<'END'
+import nrrd, numpy
+labels = numpy.zeros((12, 10, 8), 'uint8')
+labels[2:6, 2:7, 2:6] = 1
+labels[7:10, 3:6, 2:5] = 2
+nrrd.write('in.seg.nrrd', labels, {
+    'space': 'left-posterior-superior', 'space directions': numpy.diag([1.5, 1.5, 2]), 'space origin': [10, 20, 30.0],
+    'kinds': ['domain'] * 3, 'encoding': 'gzip', 'Segment0_Name': 'left kidney', 'Segment0_LabelValue': '2',
+    'Segment1_Name': 'Tumour 1', 'Segment1_LabelValue': '1'})
+END
+  voxelize --label list in.seg.nrrd >listed
+  [[ $(<listed) == $'0 853 3838.5\n1 80 360 Tumour 1\n2 27 121.5 left kidney' ]] || fail "$(<listed)"
+  voxelize --label 'left kidney' --stats=stats in.seg.nrrd -o named.vdb
+  voxelize --label 2 in.seg.nrrd | cmp - named.vdb
+  [[ $(number label_voxels stats) == 27 ]] || fail "$(<stats)"
+  rm in.seg.nrrd listed stats named.vdb
+}
+
 # Points of the mesh against the labels about them: in the world of nibabel's affine, every point must lie between a
 # labelled centre and another one, nearer than a voxel's diagonal to both.
 test_the_liver_lies_where_nibabel_says() {

@@ -34,8 +34,9 @@ test_options_stand_in_the_page_and_the_reverse() {
 }
 
 test_options_of_plot_stand_in_its_page() {
-  plot() { gewebe plot "$@"; }
-  options_of_help plot >help.txt
+  printf '%s\n' '#!/bin/sh' 'exec gewebe plot "$@"' >plot
+  chmod +x plot
+  options_of_help ./plot >help.txt
   options_of_page "$GEWEBE_ROOT/man/gewebe-plot.1" >page.txt
   grep -qx -e --y help.txt || fail 'gewebe plot --help shows no options'
   compare_options help.txt page.txt gewebe-plot

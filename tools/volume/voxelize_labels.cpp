@@ -22,7 +22,7 @@ std::vector<LabelRange> labels_from_text(const std::string& text, const char* ex
     const char* const end = word.data() + word.size();
     LabelRange& range = labels.emplace_back();
     begin = comma + 1;
-    if (!word.empty() &&
+    if (!word.empty() && word != "list" &&
         std::string_view("-+.0123456789").find(word[0]) == std::string_view::npos) {
       range.name = word;
       continue;
