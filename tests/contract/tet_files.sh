@@ -118,6 +118,8 @@ names = glob.glob('other/*.vtu')
 assert len(names) == 96, names
 for name in names:
     found, expected = tetgen(name), tetgen(name[6:].split('_')[0])
+    if 'msh1' in name: # has no names of groups, so material 0 keeps the number that Gmsh chose
+        expected = free(expected, 3)
     if '_0' in name: # text, of fewer digits
         found = [(tuple(tuple(float('%.5g' % x) for x in p) for p in n), m) for n, m in found]
         expected = [(tuple(tuple(float('%.5g' % x) for x in p) for p in n), m) for n, m in expected]
@@ -161,6 +163,8 @@ names = glob.glob('other/*.m*sh')
 assert len(names) == 11, names
 for name in names:
     found, expected = tetgen(name), tetgen(name[6:].split('_')[0])
+    if 'msh1' in name: # has no names of groups, so material 0 keeps the number that Gmsh chose
+        expected = free(expected, 3)
     same(name, *((rounded(found), rounded(expected)) if 'text' in name else (found, expected)))
 END
   python3 check.py
