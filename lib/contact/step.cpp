@@ -106,6 +106,10 @@ private:
   bool follow_way(CondensedSystem& system, bool balanced);
   void take(CondensedSystem& system, const Step& step, double part);
   bool lower_energy(CondensedSystem& system, double contact);
+  int simple_iterations() const {
+    return options_.h > 0 ? options_.parameters.gauss_newton
+                          : options_.parameters.gauss_newton_at_rest;
+  }
   bool iterate(CondensedSystem& system, int iteration, bool& converged);
   bool move_bodies(const CondensedSystem& system, bool ends);
   struct Round {
@@ -338,7 +342,7 @@ bool StepSolver::Work::iterate(CondensedSystem& system, int iteration, bool& con
   last_step_ = std::numeric_limits<double>::infinity();
   // The exact Hessian converges fastest from near by; from afar it may be all but singular.
   const HessianMode from_afar =
-      iteration < p.gauss_newton ? HessianMode::gauss_newton : HessianMode::projected;
+      iteration < simple_iterations() ? HessianMode::gauss_newton : HessianMode::projected;
   if (!(near && solve_system(system, HessianMode::exact)) && !solve_system(system, from_afar) &&
       !solve_system(system, HessianMode::projected))
     throw NotSolved("contact: Newton's system is not positive definite");
@@ -457,8 +461,8 @@ bool StepSolver::Work::solve_round(const Round& round, double margin, bool& exac
     ++report_.iterations;
     if (!gained && !done) {
       // Nothing to be gained by the simple Hessian, perhaps by the projected one.
-      if (iteration <= p.gauss_newton) {
-        iteration = p.gauss_newton;
+      if (iteration <= simple_iterations()) {
+        iteration = simple_iterations();
         continue;
       }
       throw NotSolved("contact: no descent");
