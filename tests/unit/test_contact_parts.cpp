@@ -109,7 +109,8 @@ TEST(ContactParts, TilesThatMayMeetABoxAreFound) {
     const Box3 box{at, at + Vec3{3, 3, 3}};
     const std::vector<std::uint32_t> near = tiles.near({&box, 1}, bounds);
     const SurfacePart part = tiles.part(near);
-    least = std::min(least, part.surface.node.size());
+    if (part.surface.node.size() < least)
+      least = part.surface.node.size();
     // The part is what it says.
     for (std::size_t v = 0; v < part.surface.node.size(); ++v) {
       EXPECT_EQ(part.node[part.place[v]], part.surface.node[v]);
