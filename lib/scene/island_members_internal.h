@@ -90,6 +90,8 @@ public:
   void end(std::span<const Force> forces, double h, const Context& context) override;
   /// Replaces the load at the end of the step.
   void set_load(Load load) { given_ = std::move(load); }
+  /// Replaces the time at that end, for what relaxes.
+  void set_time(double time) { given_time_ = time; }
   /// Interpolates the load between `start` and `end`, from that of the output state to that at
   /// `end`, unless it pulses. A jump of the load between steps of the scene then moves other
   /// objects no faster than this interval allows.
@@ -107,6 +109,7 @@ private:
   const std::vector<std::uint32_t>& instrument_of_piece_;
   Load load_;
   std::optional<Load> given_;
+  std::optional<double> given_time_;
   std::optional<Way> way_;
   std::unique_ptr<StaticContactBody> body_;
   SolidStatic* strained_ = nullptr;         ///< instead of body_ if the object has a law

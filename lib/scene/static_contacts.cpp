@@ -140,7 +140,9 @@ std::vector<Group> groups_of(World& w, const std::set<ObjectPair>& late,
 bool needs_showing(World& w, const Group& group) {
   return group.moves || std::ranges::any_of(group.parts.statics, [&](std::size_t index) {
            const Object& object = w.now.objects[index];
-           return !object.shown.valid || object.load->changes_until() > object.shown.time;
+           return !object.shown.valid ||
+                  (relaxes(object) && w.now.clock.time > object.shown.time) ||
+                  object.load->changes_until() > object.shown.time;
          });
 }
 
@@ -231,9 +233,12 @@ private:
       members.instruments[n].set_target(between(legs_[n].from, legs_[n].to, to),
                                         legs_[n].duration * (to - from));
     const double share = begin + to * (end - begin);
-    for (std::size_t k = 0; k < parts.statics.size(); ++k)
+    for (std::size_t k = 0; k < parts.statics.size(); ++k) {
+      members.statics[k].set_time(w_.now.clock.shown +
+                                  share * (w_.now.clock.time - w_.now.clock.shown));
       members.statics[k].set_load(
           load_between(before_[k], *w_.now.objects[parts.statics[k]].shown.load, shape_[k], share));
+    }
     const double now = w_.now.clock.time;
     try {
       cache.motion->advance(members.all, now, now, w_.context);
