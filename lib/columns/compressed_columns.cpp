@@ -113,7 +113,8 @@ std::vector<std::uint8_t> bytes_of(const Crosses& chunk) {
 CompressedColumns::CompressedColumns(CompressedLayout layout, std::size_t nodes, ChunkReader reader)
     : layout_(std::move(layout)), node_count_(nodes), reader_(std::move(reader)),
       place_(layout_.clusters.node.size()), at_(layout_.count.size()),
-      row_numbers_(layout_.with_columns), chunks_(layout_.with_columns) {
+      row_numbers_(layout_.with_columns), chunks_(layout_.with_columns),
+      largest_(layout_.count.size()) {
   cluster_.resize(place_.size());
   for (std::size_t a = 0; a < layout_.clusters.size(); ++a) {
     const auto members = layout_.clusters.nodes(a);
@@ -248,6 +249,48 @@ std::vector<double> CompressedColumns::sum_at(std::size_t cluster,
   for (const auto& [a, load] : loads)
     add_product(view(std::min(a, cluster), std::max(a, cluster)), a < cluster, load, cpu, sum);
   return sum;
+}
+
+std::vector<double> CompressedColumns::sum_at(std::span<const std::uint32_t> clusters,
+                                              std::span<const NodeVector> forces,
+                                              const Context& context) const {
+  const std::vector<ClusterLoad> loads = loads_of(forces);
+  std::vector<double> all;
+  for (const std::uint32_t cluster : clusters) {
+    const std::vector<double> sum = sum_at(cluster, loads, context.cpu);
+    all.insert(all.end(), sum.begin(), sum.end());
+  }
+  return all;
+}
+
+std::span<const std::array<double, 2>> CompressedColumns::largest(std::size_t chunk_index,
+                                                                  std::size_t cluster) const {
+  std::vector<std::array<double, 2>>& kept =
+      largest_[first_block(layout_, chunk_index) + cluster - chunk_index];
+  if (kept.empty())
+    kept = largest_entries(view(chunk_index, cluster));
+  return kept;
+}
+
+std::vector<double> CompressedColumns::bounds(std::span<const NodeVector> forces,
+                                              const Context& context) const {
+  const std::vector<ClusterLoad> loads = loads_of(forces);
+  std::vector<double> bound(layout_.clusters.size());
+  for (std::size_t b = 0; b < bound.size(); ++b)
+    for (const auto& [a, load] : loads) {
+      if (a == b) {
+        std::vector<double> sum(3 * layout_.clusters.nodes(b).size());
+        add_product(view(a, a), false, load, context.cpu, sum);
+        double most = 0;
+        for (const double u : sum)
+          most = std::max(most, std::abs(u));
+        bound[b] += most;
+      } else {
+        const std::size_t first = std::min(a, b), second = std::max(a, b);
+        bound[b] += product_bound(view(first, second), a < b, load, largest(first, second));
+      }
+    }
+  return bound;
 }
 
 void CompressedColumns::read(std::size_t k, std::span<double> out) const {

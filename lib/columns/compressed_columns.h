@@ -79,6 +79,14 @@ public:
   /// same bytes for any number of threads.
   void add(std::span<const NodeVector> forces, const Context& context, std::span<double> u) const;
 
+  /// C f at the nodes of some clusters of layout(): 3 numbers for each node, cluster by cluster,
+  /// with the bits of add() to zeros. \pre as add
+  std::vector<double> sum_at(std::span<const std::uint32_t> clusters,
+                             std::span<const NodeVector> forces, const Context& context) const;
+  /// Bound of the size of C f along an axis, by cluster. It costs much less than the sum. \pre as
+  /// add
+  std::vector<double> bounds(std::span<const NodeVector> forces, const Context& context) const;
+
   /// Number of values that a sum with forces at these nodes reads from memory.
   double numbers(std::span<const std::uint32_t> nodes) const;
 
@@ -115,7 +123,10 @@ private:
   std::vector<std::uint32_t> place_;   ///< of a node in its cluster
   std::vector<BlockPlace> at_;         ///< of each block in its chunk
   std::vector<double> row_numbers_;    ///< of a cluster's blocks with all others
+  std::span<const std::array<double, 2>> largest(std::size_t chunk, std::size_t cluster) const;
   mutable std::vector<std::optional<Crosses>> chunks_;
+  /// By block: of its terms; empty while it was not needed.
+  mutable std::vector<std::vector<std::array<double, 2>>> largest_;
   mutable std::uint64_t chunks_read_ = 0;
 };
 

@@ -274,6 +274,31 @@ void add_product_of(const CrossView& b, const T* from, const double* scale, std:
   }
 }
 
+template <class T>
+void append_largest(const CrossView& b, const T* from, std::size_t count,
+                    std::vector<std::array<double, 2>>& to) {
+  const auto most = [](const T* begin, std::size_t size) {
+    int largest = 0;
+    for (std::size_t k = 0; k < size; ++k)
+      largest = std::max(largest, std::abs(int{begin[k]}));
+    return static_cast<double>(largest);
+  };
+  for (std::size_t k = 0; k < count; ++k, from += b.stride())
+    to.push_back({most(from, b.rows), most(from + b.rows, b.columns)});
+}
+
+template <class T>
+double product_bound_of(const CrossView& b, const T* from, const double* scale, std::size_t count,
+                        bool transposed, std::span<const CrossLoad> x,
+                        const std::array<double, 2>* largest) {
+  const std::size_t input = transposed ? 0 : b.rows;
+  double sum = 0;
+  for (std::size_t k = 0; k < count; ++k)
+    sum += std::abs(scale[k] * product_of(from + k * b.stride() + input, x)) *
+           largest[k][transposed ? 1 : 0];
+  return sum;
+}
+
 } // namespace
 
 CrossCount append_crosses(std::span<double> rest, std::size_t rows, bool symmetric, double bound,
@@ -288,6 +313,21 @@ void add_entries(const CrossView& block, std::size_t row, std::size_t column, st
   add_entries_of(block, block.wide, block.scale, block.count.wide, row, column, size, to);
   add_entries_of(block, block.narrow, block.scale + block.count.wide, block.count.narrow, row,
                  column, size, to);
+}
+
+std::vector<std::array<double, 2>> largest_entries(const CrossView& block) {
+  std::vector<std::array<double, 2>> all;
+  append_largest(block, block.wide, block.count.wide, all);
+  append_largest(block, block.narrow, block.count.narrow, all);
+  return all;
+}
+
+double product_bound(const CrossView& block, bool transposed, std::span<const CrossLoad> x,
+                     std::span<const std::array<double, 2>> largest) {
+  return product_bound_of(block, block.wide, block.scale, block.count.wide, transposed, x,
+                          largest.data()) +
+         product_bound_of(block, block.narrow, block.scale + block.count.wide, block.count.narrow,
+                          transposed, x, largest.data() + block.count.wide);
 }
 
 void add_product(const CrossView& block, bool transposed, std::span<const CrossLoad> x,

@@ -13,6 +13,7 @@
 
 #include "base/cpu.h"
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <span>
@@ -65,6 +66,14 @@ struct CrossLoad {
 /// size.
 void add_entries(const CrossView& block, std::size_t row, std::size_t column, std::size_t size,
                  double* to);
+
+/// Largest |u| and |v| of each term. \pre not symmetric
+std::vector<std::array<double, 2>> largest_entries(const CrossView& block);
+
+/// Bound of |B x|, or of |Bᵀ x| with `transposed`, along any axis: the sum of those of the terms.
+/// \param largest  of the terms   \pre not symmetric
+double product_bound(const CrossView& block, bool transposed, std::span<const CrossLoad> x,
+                     std::span<const std::array<double, 2>> largest);
 
 /// y += B x, or Bᵀ x with `transposed`, for a sparse vector x.
 /// \pre y.size() is the number of rows, or of columns

@@ -43,12 +43,22 @@ std::size_t row_nodes_of(const Model& model, const ComplianceSource& source) {
   return columns->row_nodes();
 }
 
+/// Whether all nodes that can move and have rows have columns.
+bool have_all_columns(const Model& model, const CompressedColumns& columns) {
+  for (std::uint32_t node = 0; node < columns.row_nodes(); ++node)
+    if (model.nodes[node].fixed != fixed_all && !columns.has(node))
+      return false;
+  return true;
+}
+
 } // namespace
 
 Compliance::Compliance(const Model& model, std::shared_ptr<ComplianceSource> source,
                        const Context& context, bool bounded, bool may_be_free)
     : axes_(3 * model.nodes.size()), source_(source ? std::move(source) : compliance_of_model()),
       compressed_(source_->columns() != nullptr ? source_->columns()->compressed() : nullptr),
+      whole_(compressed_ != nullptr && have_all_columns(model, *compressed_) ? compressed_
+                                                                             : nullptr),
       rows_(3 * row_nodes_of(model, *source_)), context_(context),
       cache_(rows_ / 3, source_->columns(), columns_of(rows_), column_bytes(context), bounded) {
   context_.progress = nullptr;

@@ -92,6 +92,10 @@ public:
   /// \param allowed  largest error of an entry, mm
   void add(std::span<const NodeVector> forces, double allowed, std::span<double> u);
 
+  /// Compressed columns, if all of the first m nodes that can move have one: parts of sums can be
+  /// computed; else null.
+  const CompressedColumns* compressed_rows() const noexcept { return whole_; }
+
   /// u = C f in place, for right-hand sides over all axes, one after the other.
   void solve(std::span<double> over_axes, std::size_t columns = 1);
 
@@ -137,6 +141,7 @@ private:
   std::size_t axes_;
   std::shared_ptr<ComplianceSource> source_;
   const CompressedColumns* compressed_; ///< of the source, or null
+  const CompressedColumns* whole_;      ///< see compressed_rows
   std::size_t rows_;
   Context context_;
   ColumnCache cache_;

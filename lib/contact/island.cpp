@@ -114,7 +114,7 @@ BodySurface instrument_surface(const InstrumentShape& shape) {
 
 IslandMotion::IslandMotion(std::span<const BodySurface* const> surfaces,
                            const collision::OwnerTable<double>& friction,
-                           const Parameters& parameters)
+                           const Parameters& parameters, double edge)
     : parameters_(parameters), island_(std::make_unique<Island>()) {
   Island& island = *island_;
   collision::CollisionSurface& all = island.surface;
@@ -155,7 +155,7 @@ IslandMotion::IslandMotion(std::span<const BodySurface* const> surfaces,
         island.friction.set(m, n, friction.at(m, n));
       }
   collision::complete_surface(all);
-  island.edge = median_edge(all);
+  island.edge = edge > 0 ? edge : median_edge(all);
   if (!(island.edge > 0))
     island.edge = std::isfinite(smallest_radius) ? smallest_radius : 1;
   island.activation_distance = std::min(parameters_.activation_distance * island.edge,

@@ -87,8 +87,11 @@ class IslandMotion {
 public:
   /// \param surfaces  of the members; their pieces are numbered one behind the other
   /// \param friction  Coulomb's coefficient of two pieces; < 0: they do not touch
+  /// \param edge  median of the edges that may touch, mm, where these are parts of surfaces; 0: is
+  /// found
   IslandMotion(std::span<const BodySurface* const> surfaces,
-               const collision::OwnerTable<double>& friction, const Parameters& parameters = {});
+               const collision::OwnerTable<double>& friction, const Parameters& parameters = {},
+               double edge = 0);
   ~IslandMotion();
 
   /// Steps from one time to the other, in halves where contact is not solved. \param members  one

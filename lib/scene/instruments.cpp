@@ -96,8 +96,7 @@ InstrumentReport report_of(const World& w, std::size_t instrument) {
   for (const Object& object : w.now.objects)
     for (const NodalContactForce& t : object.shown.contact)
       if (t.instrument == instrument)
-        add(object.model().nodes[t.node].position + vector_at(*object.shown.displacement, t.node),
-            t.force);
+        add(object.model().nodes[t.node].position + contact_displacement(object, t.node), t.force);
   for (const Instrument::Grip& grip : i.grips) {
     const std::vector<NodeVector>& forces = *w.now.objects[grip.object].shown.forces;
     const auto f =

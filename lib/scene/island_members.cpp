@@ -107,6 +107,11 @@ std::vector<double> stood_shape(World& w, Object& object) {
   return {shape.begin(), shape.end()};
 }
 
+void StaticMember::take_part(const SurfacePart& part, const Load& begin,
+                             std::function<void(std::span<const NodalContactForce>)> check) {
+  part_ = Part{&part, &begin, std::move(check), {}};
+}
+
 void StaticMember::follow_load(double start, double end) {
   Object& object = w_.now.objects[object_];
   if (!object.load->force_period.empty() ||
@@ -151,10 +156,29 @@ contact::ContactBody& StaticMember::begin(double /*from*/, double to, const Cont
     });
     return *body;
   }
+  if (part_) {
+    Load begin = *part_->begin;
+    for (const NodalContactForce& f : object.touching)
+      begin.force[f.node] += f.force;
+    std::vector<NodeVector> forces;
+    for (const auto& [node, force] : begin.force)
+      forces.push_back({node, force});
+    const SurfacePart& part = *part_->part;
+    part_->stood = solver_of(w_, object).displacement_of_clusters(part.clusters, forces);
+    body_ = std::make_unique<ElastostaticContactBody>(
+        StaticContactState{&object.model(), &surface_, &load_, part_->stood, part.place,
+                           std::move(last),
+                           [this, &object, &part](std::span<const double> u) {
+                             at_object(w_, object, [&] { require_bounded(object, u, part.node); });
+                           }},
+        [this, &object]() -> Elastostatic& { return solver_of(w_, object); }, part.clusters);
+    return *body_;
+  }
   StaticContactState state{&object.model(),
                            &surface_,
                            &load_,
                            *object.shown.displacement,
+                           {},
                            std::move(last),
                            [this, &object](std::span<const double> u) {
                              at_object(w_, object, [&] { require_bounded(object, u); });
@@ -176,9 +200,15 @@ contact::ContactBody& StaticMember::begin(double /*from*/, double to, const Cont
 
 void StaticMember::end(std::span<const Force> forces, double /*h*/, const Context& /*context*/) {
   Object& object = w_.now.objects[object_];
-  object.touching = nodal_forces(forces, surface_.node, instrument_of_piece_);
+  std::vector<NodalContactForce> touching =
+      nodal_forces(forces, surface_.node, instrument_of_piece_);
+  if (part_)
+    part_->check(touching);
+  object.touching = std::move(touching);
   if (held_)
     return;
+  if (part_)
+    return end_part();
   std::span<const double> u;
   if (strained_ != nullptr) {
     strained_->end_contact();
@@ -194,6 +224,21 @@ void StaticMember::end(std::span<const Force> forces, double /*h*/, const Contex
   object.shown.box.reset();
   if (object.statics.warped)
     object.warped = object.statics.warped->answer();
+}
+
+void StaticMember::end_part() {
+  Shown& shown = w_.now.objects[object_].shown;
+  shown.shaped = false;
+  shown.whole = {};
+  shown.box.reset();
+  shown.touched.clear();
+  for (std::uint32_t v = 0; v < surface_.node.size(); ++v) {
+    const Vec3 u = body_->displacement_of(v);
+    shown.largest = std::max({shown.largest, std::abs(u.x), std::abs(u.y), std::abs(u.z)});
+  }
+  for (const NodalContactForce& f : w_.now.objects[object_].touching)
+    shown.touched[f.node] = body_->displacement_of(static_cast<std::uint32_t>(
+        std::ranges::lower_bound(surface_.node, f.node) - surface_.node.begin()));
 }
 
 // ---- instruments

@@ -7,6 +7,7 @@
 #include "contact/nodal_contact_force.h"
 #include "scene/world_internal.h"
 #include "statics/static_contact_body.h"
+#include "statics/surface_tiles.h"
 
 #include <cstddef>
 #include <cstdint>
@@ -38,6 +39,38 @@ struct HeldNode {
   auto operator<=>(const HeldNode&) const = default;
 };
 
+/// Where contact of an elastostatic object is found on a part of its surface alone.
+struct ContactReach {
+  contact::ModelSurface surface;
+  SurfaceTiles tiles;
+  std::vector<NodeVector> forces{}; ///< of `bounds`, see SurfaceTiles
+  std::vector<double> bounds{};
+
+  ContactReach(contact::ModelSurface&& of, const NodeClusters& clusters)
+      : surface(std::move(of)), tiles(surface, clusters) {}
+  ContactReach(const ContactReach&) = delete;
+  ContactReach& operator=(const ContactReach&) = delete;
+};
+/// That of an object which only instruments touch, whose load does not change and is forces alone,
+/// and whose solver finds parts of its shape alone; else null. The same, to the bit, whatever has
+/// been read of the scene. \throw as solver_of
+std::shared_ptr<ContactReach> contact_reach(World& w, std::size_t index);
+/// Bounds of its displacements under some contact forces.
+const std::vector<double>& bounds_under(World& w, std::size_t index, ContactReach& reach,
+                                        std::span<const NodalContactForce> contact);
+/// Box that holds the surface of an elastostatic object, small enough to tell what is near it.
+Box3 contact_box(World& w, std::size_t index);
+/// Displacement of a node in contact.
+Vec3 contact_displacement(const Object& object, std::uint32_t node);
+
+/// An island with a part of an object's surface.
+struct PartIsland {
+  std::shared_ptr<const ContactReach> reach;
+  std::vector<std::uint32_t> tiles;
+  SurfacePart part;
+  std::unique_ptr<contact::IslandMotion> motion;
+};
+
 /// Cached surfaces of an island. They are valid while the models and instruments stay the same.
 struct IslandCache {
   struct Key {
@@ -56,8 +89,13 @@ struct IslandCache {
   std::deque<contact::BodySurface> surfaces;
   std::vector<std::uint32_t> instrument_of_piece; ///< or other_surface
   std::unique_ptr<contact::IslandMotion> motion;
+  std::deque<PartIsland> parts; ///< the last ones
   std::uint64_t used = 0;
 };
+
+/// Cached island of one elastostatic object's tiles, ascending, and of instruments.
+PartIsland& part_island(IslandCache& whole, const std::shared_ptr<const ContactReach>& reach,
+                        std::vector<std::uint32_t> tiles);
 
 /// Cached island of these parts. It is created at its first use.
 IslandCache& island_of(World& w, const IslandParts& parts);
@@ -92,6 +130,10 @@ public:
   void set_load(Load load) { given_ = std::move(load); }
   /// Replaces the time at that end, for what relaxes.
   void set_time(double time) { given_time_ = time; }
+  /// Finds contact on a part of the surface: that of the constructor. \param begin  load at the
+  /// beginning of the step \param check  called with the contact forces before the step ends
+  void take_part(const SurfacePart& part, const Load& begin,
+                 std::function<void(std::span<const NodalContactForce>)> check);
   /// Interpolates the load between `start` and `end`, from that of the output state to that at
   /// `end`, unless it pulses. A jump of the load between steps of the scene then moves other
   /// objects no faster than this interval allows.
@@ -107,7 +149,15 @@ private:
   std::size_t object_;
   const contact::ModelSurface& surface_;
   const std::vector<std::uint32_t>& instrument_of_piece_;
+  void end_part();
+  struct Part {
+    const SurfacePart* part = nullptr;
+    const Load* begin = nullptr;
+    std::function<void(std::span<const NodalContactForce>)> check;
+    std::vector<double> stood; ///< displacement of its clusters
+  };
   Load load_;
+  std::optional<Part> part_;
   std::optional<Load> given_;
   std::optional<double> given_time_;
   std::optional<Way> way_;
@@ -133,6 +183,10 @@ public:
   }
   void follow_way() { given_.reset(); }
   const Pose& pose() const { return now_; }
+  /// Pose at the end of the step that has been begun. \pre it is solved
+  Pose end_pose() const {
+    return {target_.place + (instrument().coupled ? body_->displacement() : Vec3{}), target_.turn};
+  }
 
 private:
   Instrument& instrument() const { return w_.now.instruments[instrument_]; }

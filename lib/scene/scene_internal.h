@@ -82,12 +82,15 @@ struct Matter {
   Told told;
 };
 
+struct ContactReach;
+
 /// Solvers of an elastostatic object, made when needed.
 struct Statics {
   std::shared_ptr<Elastostatic> solver;
   std::shared_ptr<TwoStep> two_step;             // over `solver`
   std::shared_ptr<WarpedStatics> warped;         // in place of both
   std::shared_ptr<SolidStatic> strained;         // in place of all
+  std::shared_ptr<ContactReach> reach;           // of `solver`, see contact_reach
   std::shared_ptr<ComplianceSource> prepared;    // of the cut model, by cut_source
   std::shared_ptr<const CutStiffness> stiffness; // source of `prepared`
   ElastostaticCounts spent;                      // by solvers that have been dropped
@@ -160,6 +163,10 @@ struct Shown {
   double time = 0;
   bool posed = false;        // the displacement is a shape of ffe
   std::optional<Box3> box{}; // see shown_box; empty until it is needed for this shape
+  /// Displacements of nodes in contact, and the largest one seen (mm), where contact was found
+  /// before the shape.
+  std::map<std::uint32_t, Vec3> touched{};
+  double largest = 0;
 };
 
 /// Previous state of an elastostatic object, one step earlier; see shape_velocity.

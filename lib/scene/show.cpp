@@ -82,12 +82,14 @@ double displacement_limit(Object& object) {
   return std::min(max_sizes * object.matter->size, largest_number);
 }
 
-/// \param displacement 3 n numbers, of a shape that is found now
-void require_bounded(Object& object, std::span<const double> displacement) {
+/// \param displacement 3 n numbers, of a shape that is found now, or of `nodes`
+void require_bounded(Object& object, std::span<const double> displacement,
+                     std::span<const std::uint32_t> nodes) {
   const double max = displacement_limit(object);
   for (std::size_t k = 0; k < displacement.size(); ++k)
     if (!(std::abs(displacement[k]) <= max))
-      throw Error("node " + std::to_string(k / 3) + " is displaced by over " + number_text(max) +
+      throw Error("node " + std::to_string(nodes.empty() ? k / 3 : nodes[k / 3]) +
+                  " is displaced by over " + number_text(max) +
                   " mm, a million times the size of the object, expected a smaller load or "
                   "timestep");
 }
@@ -134,6 +136,11 @@ void warn_of_range(World& w, Object& object) {
        (strained ? " is strained by " + percent(range.strain)
                  : " is turned by " + percent(range.turn)) +
        ", the shape is not to be trusted there");
+}
+
+void warn_of_range(World& w, Object& object, double largest) {
+  if (!object.range.warned && may_leave_range(object, largest))
+    shape_in_step(w, object); // looks at it
 }
 
 namespace {
@@ -225,6 +232,8 @@ void begin_showing(World& w, Object& object) {
   shown.whole = {};
   shown.forces = {};
   shown.box.reset();
+  shown.touched.clear();
+  shown.largest = 0;
 }
 
 Load acting_at(const Object& object, double time) {

@@ -10,7 +10,9 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <iterator>
 #include <map>
+#include <memory>
 #include <numbers>
 #include <optional>
 #include <set>
@@ -27,9 +29,8 @@ bool is_static(const Object& object) {
   return object.method == Method::ffe && !object.in_motion;
 }
 
-/// Whether contact of the object has something to do with instruments.
-bool near_instrument(World& w, std::size_t object, std::size_t k) {
-  const Box3& box = shown_box(w, object);
+/// Whether an object in this box has something to do with an instrument.
+bool near_instrument(const World& w, const Box3& box, std::size_t k) {
   const InstrumentShape& shape = w.now.instruments[k].shape;
   const double margin = near_part * box.longest_side();
   for (std::size_t p = 0; p < w.now.poses.size(); ++p) {
@@ -72,6 +73,16 @@ bool touched_by(const Object& object, std::size_t instrument) {
 }
 
 using ObjectPair = std::pair<std::size_t, std::size_t>;
+/// An object and an instrument.
+using ToolPair = std::pair<std::size_t, std::size_t>;
+
+/// Pairs of surfaces that may touch.
+struct Pairs {
+  std::set<ObjectPair> objects;
+  std::set<ToolPair> tools;
+
+  bool empty() const { return objects.empty() && tools.empty(); }
+};
 
 /// Whether two objects, or one and itself, may touch where nothing moves far.
 bool are_near(World& w, const ObjectPair& pair) {
@@ -82,8 +93,7 @@ bool are_near(World& w, const ObjectPair& pair) {
 }
 
 /// \param late  pairs that count as near \param apart  becomes those that are not near
-std::vector<Group> groups_of(World& w, const std::set<ObjectPair>& late,
-                             std::vector<ObjectPair>& apart) {
+std::vector<Group> groups_of(World& w, const Pairs& late, Pairs& apart) {
   const std::size_t objects = w.now.objects.size(), instruments = w.now.instruments.size();
   DisjointSets sets(objects + instruments);
   const auto join = [&](std::size_t a, std::size_t b) {
@@ -93,10 +103,10 @@ std::vector<Group> groups_of(World& w, const std::set<ObjectPair>& late,
   for (const ContactRule& rule : w.now.contacts)
     if (is_static(w.now.objects[rule.object]) && is_static(w.now.objects[rule.other])) {
       const ObjectPair pair(rule.object, rule.other);
-      if (late.contains(pair) || are_near(w, pair))
+      if (late.objects.contains(pair) || are_near(w, pair))
         join(rule.object, rule.other);
       else
-        apart.push_back(pair);
+        apart.objects.insert(pair);
       takes_part[rule.object] = takes_part[rule.other] = 1;
     }
   std::vector<std::pair<std::size_t, std::size_t>> near; // object, instrument
@@ -108,10 +118,16 @@ std::vector<Group> groups_of(World& w, const std::set<ObjectPair>& late,
       continue;
     if (!takes_instruments(w, object))
       continue;
+    const Box3 box = contact_box(w, o);
     for (std::size_t k = 0; k < instruments; ++k) {
       const Instrument& i = w.now.instruments[k];
-      if (i.shape.blade || (!touched_by(object, k) && !near_instrument(w, o, k)))
+      if (i.shape.blade)
         continue;
+      if (!touched_by(object, k) && !late.tools.contains({o, k}) && !near_instrument(w, box, k)) {
+        if (i.present)
+          apart.tools.insert({o, k});
+        continue;
+      }
       near.emplace_back(o, k);
       takes_part[o] = 1;
       if (i.coupled && !i.stepped)
@@ -137,12 +153,14 @@ std::vector<Group> groups_of(World& w, const std::set<ObjectPair>& late,
   return groups;
 }
 
-bool needs_showing(World& w, const Group& group) {
+bool changes(const World& w, const Object& object) {
+  return !object.shown.valid || object.load->changes_until() > object.shown.time ||
+         (relaxes(object) && w.now.clock.time > object.shown.time);
+}
+
+bool needs_showing(const World& w, const Group& group) {
   return group.moves || std::ranges::any_of(group.parts.statics, [&](std::size_t index) {
-           const Object& object = w.now.objects[index];
-           return !object.shown.valid ||
-                  (relaxes(object) && w.now.clock.time > object.shown.time) ||
-                  object.load->changes_until() > object.shown.time;
+           return changes(w, w.now.objects[index]);
          });
 }
 
@@ -150,10 +168,14 @@ bool needs_showing(World& w, const Group& group) {
 class GroupStep {
 public:
   GroupStep(World& w, const Group& group) : w_(w), group_(group) {
+    if (group.parts.statics.size() == 1)
+      reach_ = contact_reach(w, group.parts.statics[0]);
     for (const std::size_t index : group.parts.statics) {
       Object& object = w.now.objects[index];
+      if (!reach_)
+        shape_in_step(w, object);
       before_.push_back(*object.shown.load);
-      shape_.push_back(stood_shape(w, object));
+      shape_.push_back(reach_ ? std::vector<double>() : stood_shape(w, object));
       begin_showing(w, object);
       load_shown(w, object);
     }
@@ -168,10 +190,14 @@ public:
       Object& object = w_.now.objects[index];
       Shown& shown = object.shown;
       shown.contact = object.touching;
-      shown.shaped = true;
-      warn_of_range(w_, object);
-      if (object.statics.made())
-        shown.forces = static_forces(object);
+      if (reach_ && !shown.shaped) {
+        warn_of_range(w_, object, shown.largest);
+      } else {
+        shown.shaped = true;
+        warn_of_range(w_, object);
+        if (object.statics.made())
+          shown.forces = static_forces(object);
+      }
       at_object(w_, object, [&] { end_showing(w_, object); });
     }
   }
@@ -182,6 +208,8 @@ private:
     Pose from, to;
     double duration = 0; ///< of a coupled one
   };
+  /// Instruments reach more of the surface than was looked at.
+  struct MorePart {};
 
   /// From one moment of the poses to the next. \param begin, end  shares of the load's way
   void pass(std::size_t moment, double begin, double end) {
@@ -218,6 +246,112 @@ private:
     }
   }
 
+  /// Where instruments are in a part of that way that ends at `to`.
+  std::vector<Box3> boxes_of(const IslandParts& parts, std::span<const Pose> start, double to,
+                             double room) const {
+    std::vector<Box3> boxes;
+    for (std::size_t n = 0; n < legs_.size(); ++n)
+      boxes.push_back(box_with_room(w_.now.instruments[parts.instruments[n]].shape, start[n],
+                                    between(legs_[n].from, legs_[n].to, to), room));
+    return boxes;
+  }
+
+  static Box3 box_with_room(const InstrumentShape& shape, const Pose& from, const Pose& to,
+                            double room) {
+    Box3 box = box_between(shape, from, to);
+    box.min -= Vec3{room, room, room};
+    box.max += Vec3{room, room, room};
+    return box;
+  }
+
+  /// Tiles of the object that instruments may reach, and those that are in contact.
+  std::vector<std::uint32_t> reached(std::span<const Box3> boxes,
+                                     std::span<const NodalContactForce> contact) {
+    const std::vector<double>& bounds = bounds_under(w_, group_.parts.statics[0], *reach_, contact);
+    std::vector<std::uint32_t> nodes;
+    for (const NodalContactForce& f : contact)
+      nodes.push_back(f.node);
+    const std::vector<std::uint32_t> near = reach_->tiles.near(boxes, bounds),
+                                     with = reach_->tiles.with(nodes);
+    std::vector<std::uint32_t> all;
+    std::ranges::set_union(near, with, std::back_inserter(all));
+    return all;
+  }
+
+  /// As go(), with the part of the object's surface that instruments reach: more of it where they
+  /// turn out to reach more.
+  void go_on_part(const IslandParts& parts, IslandCache& cache, std::span<const Pose> start,
+                  double from, double to) {
+    const contact::Parameters parameters;
+    const double edge = cache.motion->island().edge, nearest = cache.motion->activation_distance();
+    std::vector<std::uint32_t> tiles =
+        reached(boxes_of(parts, start, to, nearest + parameters.margin * edge),
+                w_.now.objects[parts.statics[0]].touching);
+    for (bool whole = false; !whole;) {
+      if (tiles.empty())
+        tiles.push_back(0); // an island has some surface
+      PartIsland& island = part_island(cache, reach_, tiles);
+      IslandMembers members;
+      StaticMember& object = members.statics.emplace_back(w_, parts.statics[0], island.part.surface,
+                                                          cache.instrument_of_piece);
+      members.all.push_back(&object);
+      for (std::size_t n = 0; n < legs_.size(); ++n) {
+        InstrumentMember& tool =
+            members.instruments.emplace_back(w_, parts.instruments[n], cache.surfaces[n], start[n]);
+        members.all.push_back(&tool);
+        tool.set_target(between(legs_[n].from, legs_[n].to, to), legs_[n].duration * (to - from));
+      }
+      const Load& load = before_[0]; // it does not change
+      object.set_load(load);
+      std::vector<std::uint32_t> more;
+      object.take_part(island.part, load, [&](std::span<const NodalContactForce> contact) {
+        std::vector<Box3> boxes;
+        for (std::size_t n = 0; n < legs_.size(); ++n)
+          boxes.push_back(box_with_room(w_.now.instruments[parts.instruments[n]].shape, start[n],
+                                        members.instruments[n].end_pose(), nearest));
+        more = reached(boxes, contact);
+        if (!std::ranges::includes(tiles, more))
+          throw MorePart();
+      });
+      try {
+        advance_members(*island.motion, members);
+        whole = true;
+      } catch (const MorePart&) {
+        std::vector<std::uint32_t> all;
+        std::ranges::set_union(tiles, more, std::back_inserter(all));
+        tiles = std::move(all);
+      }
+    }
+  }
+
+  /// \param share  of the load's way, at the end
+  void go_on_whole(const IslandParts& parts, IslandCache& cache, std::span<const Pose> start,
+                   double from, double to, double share) {
+    IslandMembers members;
+    make_members(w_, parts, cache, start, members);
+    for (std::size_t n = 0; n < legs_.size(); ++n)
+      members.instruments[n].set_target(between(legs_[n].from, legs_[n].to, to),
+                                        legs_[n].duration * (to - from));
+    for (std::size_t k = 0; k < parts.statics.size(); ++k) {
+      members.statics[k].set_time(w_.now.clock.shown +
+                                  share * (w_.now.clock.time - w_.now.clock.shown));
+      members.statics[k].set_load(
+          load_between(before_[k], *w_.now.objects[parts.statics[k]].shown.load, shape_[k], share));
+    }
+    advance_members(*cache.motion, members);
+  }
+
+  void advance_members(contact::IslandMotion& motion, const IslandMembers& members) {
+    const double now = w_.now.clock.time;
+    try {
+      motion.advance(members.all, now, now, w_.context);
+    } catch (...) {
+      count_contact(w_, motion.take_report());
+      throw;
+    }
+    count_contact(w_, motion.take_report());
+  }
+
   /// A part of that way, in halves where contact is not solved.
   void go(const IslandParts& parts, IslandCache& cache, double from, double to, double begin,
           double end, int halvings) {
@@ -227,25 +361,13 @@ private:
       const Pose pose = between(legs_[n].from, legs_[n].to, from);
       start.push_back(i.coupled && !i.stepped ? Pose{i.coupled->place, pose.turn} : pose);
     }
-    IslandMembers members;
-    make_members(w_, parts, cache, start, members);
-    for (std::size_t n = 0; n < legs_.size(); ++n)
-      members.instruments[n].set_target(between(legs_[n].from, legs_[n].to, to),
-                                        legs_[n].duration * (to - from));
-    const double share = begin + to * (end - begin);
-    for (std::size_t k = 0; k < parts.statics.size(); ++k) {
-      members.statics[k].set_time(w_.now.clock.shown +
-                                  share * (w_.now.clock.time - w_.now.clock.shown));
-      members.statics[k].set_load(
-          load_between(before_[k], *w_.now.objects[parts.statics[k]].shown.load, shape_[k], share));
-    }
-    const double now = w_.now.clock.time;
     try {
-      cache.motion->advance(members.all, now, now, w_.context);
-      count_contact(w_, cache.motion->take_report());
+      if (reach_)
+        go_on_part(parts, cache, start, from, to);
+      else
+        go_on_whole(parts, cache, start, from, to, begin + to * (end - begin));
       return;
     } catch (const contact::NotSolved& error) {
-      count_contact(w_, cache.motion->take_report());
       if (halvings == 0 || dynamic_cast<const contact::IntersectsAtStart*>(&error) != nullptr)
         fail_contact(w_, parts, error);
     }
@@ -257,6 +379,7 @@ private:
 
   World& w_;
   const Group& group_;
+  std::shared_ptr<ContactReach> reach_; ///< of the only object, if contact is found on a part of it
   std::vector<Load> before_;
   std::vector<std::vector<double>> shape_;
   std::vector<Leg> legs_;
@@ -280,39 +403,68 @@ const Box3& shown_box(World& w, std::size_t index) {
 
 namespace {
 
-/// Shows objects in contact where pairs of objects are near, or late.
-/// \param shown, followed  by object and instrument: become 1 \return pairs that passed each
-/// other's boxes unseen
-std::vector<ObjectPair> show_groups(World& w, const std::set<ObjectPair>& late,
-                                    std::vector<std::uint8_t>& shown,
-                                    std::vector<std::uint8_t>& followed) {
-  std::vector<ObjectPair> apart;
-  const std::vector<Group> groups = groups_of(w, late, apart);
+/// What may have passed something unseen in a step: by the boxes where it was and is.
+Pairs met_unseen(World& w, const Pairs& apart, const std::map<std::size_t, Box3>& before) {
   std::map<std::size_t, Box3> swept;
-  for (const auto& [a, b] : apart)
-    for (const std::size_t index : {a, b})
-      swept[index] = shown_box(w, index);
+  for (const auto& [index, box] : before) {
+    const Box3 now = contact_box(w, index);
+    Box3& all = swept.emplace(index, box).first->second;
+    all.add(now.min);
+    all.add(now.max);
+  }
+  Pairs met;
+  for (const ObjectPair& pair : apart.objects)
+    if (near(swept.at(pair.first), swept.at(pair.second)))
+      met.objects.insert(pair);
+  for (const ToolPair& pair : apart.tools)
+    if (near_instrument(w, swept.at(pair.first), pair.second))
+      met.tools.insert(pair);
+  return met;
+}
+
+/// Shows objects in contact where pairs are near, or late. A step that lets others meet has no
+/// effect. \param shown, followed  by object and instrument: become 1 \return pairs that have met
+/// unseen
+Pairs show_groups(World& w, const Pairs& late, std::vector<std::uint8_t>& shown,
+                  std::vector<std::uint8_t>& followed) {
+  Pairs apart;
+  const std::vector<Group> groups = groups_of(w, late, apart);
   for (const Group& group : groups) {
-    for (const std::size_t index : group.parts.statics) {
-      shape_in_step(w, w.now.objects[index]);
+    for (const std::size_t index : group.parts.statics)
       shown[index] = 1;
-    }
     for (const std::size_t k : group.parts.instruments)
       followed[k] = 1;
+  }
+  // Objects that no instrument is near may move to one.
+  std::set<std::size_t> alone;
+  for (const auto& [object, k] : apart.tools)
+    if (shown[object] == 0 && changes(w, w.now.objects[object]))
+      alone.insert(object);
+  if (alone.empty() &&
+      std::ranges::none_of(groups, [&](const Group& group) { return needs_showing(w, group); }))
+    return {};
+  std::optional<Snapshot> saved;
+  std::map<std::size_t, Box3> before;
+  if (!apart.empty())
+    saved = snapshot(w);
+  for (const auto& [a, b] : apart.objects)
+    for (const std::size_t index : {a, b})
+      before[index] = contact_box(w, index);
+  for (const auto& [object, k] : apart.tools)
+    before[object] = contact_box(w, object);
+  for (const Group& group : groups)
     if (needs_showing(w, group)) {
       GroupStep step(w, group);
       step.run();
     }
+  for (const std::size_t index : alone) {
+    at_object(w, w.now.objects[index], [&] { show(w, w.now.objects[index]); });
+    shown[index] = 1;
   }
-  for (auto& [index, box] : swept) {
-    const Box3& now = shown_box(w, index);
-    box.add(now.min);
-    box.add(now.max);
-  }
-  std::erase_if(apart, [&](const ObjectPair& pair) {
-    return !near(swept.at(pair.first), swept.at(pair.second));
-  });
-  return apart;
+  Pairs met = met_unseen(w, apart, before);
+  if (!met.empty())
+    roll_back(w, std::move(*saved));
+  return met;
 }
 
 } // namespace
@@ -320,16 +472,13 @@ std::vector<ObjectPair> show_groups(World& w, const std::set<ObjectPair>& late,
 std::vector<std::uint8_t> show_static_contacts(World& w) {
   std::vector<std::uint8_t> shown(w.now.objects.size());
   std::vector<std::uint8_t> followed(w.now.instruments.size());
-  std::set<ObjectPair> late;
+  Pairs late;
   while (!w.now.contacts.empty() || !w.now.instruments.empty()) {
-    std::optional<Snapshot> saved;
-    if (!w.now.contacts.empty())
-      saved = snapshot(w);
-    const std::vector<ObjectPair> met = show_groups(w, late, shown, followed);
+    const Pairs met = show_groups(w, late, shown, followed);
     if (met.empty())
       break;
-    roll_back(w, std::move(*saved));
-    late.insert(met.begin(), met.end());
+    late.objects.insert(met.objects.begin(), met.objects.end());
+    late.tools.insert(met.tools.begin(), met.tools.end());
   }
   for (std::size_t k = 0; k < w.now.instruments.size(); ++k) {
     Instrument& i = w.now.instruments[k];

@@ -152,6 +152,7 @@ void drop_solvers(Object& object) {
   statics.solver.reset();
   statics.warped.reset();
   statics.strained.reset();
+  statics.reach.reset();
   if (statics.two_step) {
     ElastostaticCounts second = statics.two_step->second_counts();
     second.updates = second.unchanged = 0; // those of the first stage count

@@ -80,8 +80,11 @@ void verify_shapes(World& w) {
   if (!w.options.verify_shapes)
     return;
   for (Object& object : w.now.objects)
-    if (object.method == Method::ffe && !object.warp && !object.shown.deferred)
+    if (object.method == Method::ffe && !object.warp && !object.shown.deferred) {
+      if (!object.shown.shaped && object.statics.solver)
+        at_object(w, object, [&] { update_stages(w, object, acting_load(object.shown)); });
       verify_shape(object);
+    }
 }
 
 void show_all(World& w) {

@@ -27,7 +27,7 @@ void leave_shown(World& w, Object& object) {
                 .velocity = {}};
   for (const NodalContactForce& t : shown.contact)
     if (posed)
-      came.touched[t.node] = vector_at(*shown.displacement, t.node);
+      came.touched[t.node] = contact_displacement(object, t.node);
   object.came = std::move(came);
   shown.posed = posed;
 }
@@ -51,7 +51,7 @@ std::vector<Vec3> shape_velocity(World& w, Object& object, bool afresh) {
   for (const auto& [node, u] : object.came.touched)
     load.displacement[node] = u;
   for (const NodalContactForce& t : object.shown.contact)
-    now.displacement[t.node] = vector_at(*object.shown.displacement, t.node);
+    now.displacement[t.node] = contact_displacement(object, t.node);
   std::vector<Vec3> velocity;
   const auto between = [&](std::span<const double> before, std::span<const double> after) {
     for (std::size_t i = 0; i < object.model().nodes.size(); ++i)

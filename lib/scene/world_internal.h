@@ -224,6 +224,8 @@ Load acting_at(const Object& object, double time);
 void load_shown(const World& w, Object& object);
 /// Warns, once per object, if a shape leaves the range of linear elasticity.
 void warn_of_range(World& w, Object& object);
+/// The same where the shape has not been found, but its largest displacement is known, mm.
+void warn_of_range(World& w, Object& object, double largest);
 /// Computes the displacement for output, within the tolerance.
 void shape(World& w, Object& object);
 /// Computes the exact displacement, on which the scene depends.
@@ -236,7 +238,8 @@ Load acting_load(const Shown& shown);
 /// Displacement as known: of all nodes if that was computed, else of the first ones. \pre shaped
 std::span<const double> known_shape(const Object& object);
 double displacement_limit(Object& object);
-void require_bounded(Object& object, std::span<const double> displacement);
+void require_bounded(Object& object, std::span<const double> displacement,
+                     std::span<const std::uint32_t> nodes = {});
 
 // velocity.cpp: velocities of elastostatic objects
 void leave_shown(World& w, Object& object);

@@ -3,6 +3,7 @@
 #include "base/copy_on_write.h"
 #include "base/error.h"
 #include "base/unique_number.h"
+#include "columns/compressed_columns.h"
 #include "compliance/compliance.h"
 #include "compliance/forces_at.h"
 #include "compliance/load_answer.h"
@@ -14,8 +15,10 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <iterator>
 #include <limits>
 #include <map>
+#include <numbers>
 #include <optional>
 #include <utility>
 
@@ -508,6 +511,40 @@ std::uint64_t Elastostatic::compliance_id(const Load& load) {
 DelassusOperator Elastostatic::delassus_operator(const Load& load,
                                                  std::span<const std::uint32_t> nodes) {
   return state_->delassus_operator(load, nodes);
+}
+
+const NodeClusters* Elastostatic::clusters() const noexcept {
+  if (state_->compliance.is_free())
+    return nullptr;
+  const CompressedColumns* const columns = state_->compliance.compressed_rows();
+  return columns != nullptr ? &columns->layout().clusters : nullptr;
+}
+
+namespace {
+
+/// What moves something: nodes without columns are fixed.
+std::vector<NodeVector> with_columns(const CompressedColumns& columns,
+                                     std::span<const NodeVector> forces) {
+  std::vector<NodeVector> some;
+  std::ranges::copy_if(forces, std::back_inserter(some),
+                       [&](const NodeVector& f) { return columns.has(f.node); });
+  return some;
+}
+
+} // namespace
+
+std::vector<double> Elastostatic::displacement_of_clusters(std::span<const std::uint32_t> clusters,
+                                                           std::span<const NodeVector> forces) {
+  const CompressedColumns& columns = *state_->compliance.compressed_rows();
+  return columns.sum_at(clusters, with_columns(columns, forces), state_->context);
+}
+
+std::vector<double> Elastostatic::displacement_bounds(std::span<const NodeVector> forces) {
+  const CompressedColumns& columns = *state_->compliance.compressed_rows();
+  std::vector<double> bounds = columns.bounds(with_columns(columns, forces), state_->context);
+  for (double& bound : bounds)
+    bound *= std::numbers::sqrt3;
+  return bounds;
 }
 
 void Elastostatic::prepare(std::span<const std::uint32_t> nodes) {

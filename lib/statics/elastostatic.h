@@ -31,6 +31,7 @@
 namespace gewebe {
 
 class ComplianceSource;
+struct NodeClusters;
 
 /// Displacements of some nodes under forces on them: u = free + compliance f.
 struct DelassusOperator {
@@ -143,6 +144,17 @@ public:
   /// \pre as update; the load displaces nothing; nodes ascending
   /// \throw as compliance_blocks
   DelassusOperator delassus_operator(const Load& load, std::span<const std::uint32_t> nodes);
+
+  /// Clusters of neighbours among the first m nodes, see surface_displacement, where parts of a
+  /// shape can be computed alone; else null. It does not change.
+  const NodeClusters* clusters() const noexcept;
+  /// Displacement of the nodes of some clusters under forces, cluster by cluster: 3 numbers for
+  /// each node. It neither uses nor changes the last load. \pre clusters(); forces at the first m
+  /// nodes, ascending   \throw Error if columns can't be read
+  std::vector<double> displacement_of_clusters(std::span<const std::uint32_t> clusters,
+                                               std::span<const NodeVector> forces);
+  /// Bound of the length of these displacements, by cluster, mm. \pre as displacement_of_clusters
+  std::vector<double> displacement_bounds(std::span<const NodeVector> forces);
 
   /// Solves in advance for the columns of these nodes, unless they are stored, so that later
   /// contacts there need no solve. Updates, shapes and forces are the same to the bit with and

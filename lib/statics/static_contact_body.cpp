@@ -28,7 +28,7 @@ void StaticContactBody::positions(std::span<Vec3> x) {
   const std::span<const double> u = displacement_;
   for (std::size_t k = 0; k < x.size(); ++k) {
     const std::uint32_t node = state_.surface->node[k];
-    x[k] = state_.model->nodes[node].position + vector_at(u, node);
+    x[k] = state_.model->nodes[node].position + vector_at(u, place_of(k));
   }
 }
 
@@ -58,7 +58,7 @@ double StaticContactBody::linearise(std::span<const VertexForce> forces, std::sp
     most = std::max(most, std::abs(step_[k]));
   }
   for (std::size_t k = 0; k < step.size(); ++k)
-    step[k] = vector_at(std::span<const double>(step_), state_.surface->node[k]);
+    step[k] = vector_at(std::span<const double>(step_), place_of(k));
   return state_.surface->typical.force * most;
 }
 
@@ -107,7 +107,7 @@ void StaticContactBody::move(double share, std::span<const VertexForce> forces) 
     for (std::size_t k = 0; k < rows_.size(); ++k) {
       const Block3& b = blocks[k];
       for (std::size_t a = 0; a < 3; ++a)
-        displacement_[axis_of(state_.surface->node[rows_[k]], static_cast<int>(a))] +=
+        displacement_[axis_of(place_of(rows_[k]), static_cast<int>(a))] +=
             b[3 * a] * f.x + b[3 * a + 1] * f.y + b[3 * a + 2] * f.z;
     }
   }
@@ -135,8 +135,15 @@ bool StaticContactBody::keep_momentum(double room) {
 
 std::span<const double> ElastostaticContactBody::shape_under(const Load& load) {
   Elastostatic& solver = solver_();
-  solver.update(load);
-  return solver.surface_displacement();
+  if (clusters_.empty()) {
+    solver.update(load);
+    return solver.surface_displacement();
+  }
+  std::vector<NodeVector> forces;
+  for (const auto& [node, force] : load.force)
+    forces.push_back({node, force});
+  shape_ = solver.displacement_of_clusters(clusters_, forces);
+  return shape_;
 }
 
 void ElastostaticContactBody::blocks_of(std::uint32_t node, std::span<const std::uint32_t> nodes,

@@ -5,6 +5,7 @@
 #include "contact/contact_body.h"
 #include "contact/island.h"
 #include "contact/load.h"
+#include "geometry/vector_at.h"
 #include "model/model.h"
 #include "statics/elastostatic.h"
 #include "statics/two_step.h"
@@ -22,8 +23,10 @@ namespace gewebe {
 struct StaticContactState {
   const Model* model = nullptr;
   const contact::ModelSurface* surface = nullptr;
-  const Load* load = nullptr;                 ///< at the end of the step
-  std::span<const double> displacement{};     ///< at its beginning, of the surface
+  const Load* load = nullptr; ///< at the end of the step
+  /// At its beginning, of the surface: of node i at 3 i, or of vertex k at 3 place[k] where given.
+  std::span<const double> displacement{};
+  std::span<const std::uint32_t> place{};
   std::vector<contact::VertexForce> forces{}; ///< contact forces at its beginning
   /// Throws if a shape before contact is so far off that no contact could be found.
   std::function<void(std::span<const double>)> require_shape{};
@@ -48,8 +51,12 @@ public:
   double typical_force() const override { return state_.surface->typical.force; }
   double vertex_stiffness() const override { return state_.surface->typical.stiffness; }
 
-  /// Displacement of the surface's nodes.
+  /// Displacement of the surface's nodes, laid out as that of the state.
   std::span<const double> displacement() const { return displacement_; }
+  /// That of a vertex.
+  Vec3 displacement_of(std::uint32_t vertex) const {
+    return vector_at(std::span<const double>(displacement_), place_of(vertex));
+  }
   /// Load with contact forces.
   const Load& acting() const { return acting_; }
 
@@ -58,6 +65,9 @@ protected:
   const Model& model() const { return *state_.model; }
 
 private:
+  std::uint32_t place_of(std::size_t vertex) const {
+    return state_.place.empty() ? state_.surface->node[vertex] : state_.place[vertex];
+  }
   /// Displacement under a load, of the surface's nodes at least.
   virtual std::span<const double> shape_under(const Load& load) = 0;
   /// Error of shape_under, over the largest displacement.
@@ -80,8 +90,11 @@ private:
 class ElastostaticContactBody final : public StaticContactBody {
 public:
   /// \param solver  called when the solver is needed
-  ElastostaticContactBody(StaticContactState state, std::function<Elastostatic&()> solver)
-      : StaticContactBody(std::move(state)), solver_(std::move(solver)) {}
+  /// \param clusters  that the displacement is of, where it is not that of the surface: then loads
+  /// are forces alone
+  ElastostaticContactBody(StaticContactState state, std::function<Elastostatic&()> solver,
+                          std::span<const std::uint32_t> clusters = {})
+      : StaticContactBody(std::move(state)), solver_(std::move(solver)), clusters_(clusters) {}
   bool is_linear() const override { return true; }
   std::uint64_t matrix_id() const override { return solver_().compliance_id(load()); }
 
@@ -90,6 +103,8 @@ private:
   void blocks_of(std::uint32_t node, std::span<const std::uint32_t> nodes,
                  std::span<contact::Block3> blocks) override;
   std::function<Elastostatic&()> solver_;
+  std::span<const std::uint32_t> clusters_;
+  std::vector<double> shape_; ///< of these
 };
 
 /// Body of the two-step method: linear for a given share of both stages.

@@ -7,6 +7,7 @@
 #include "columns/verify.h"
 #include "compliance/compliance.h"
 #include "compliance/load_answer.h"
+#include "compressed_source.h"
 #include "fem/model_stiffness.h"
 #include "fem/solid_model.h"
 #include "larger.h"
@@ -242,29 +243,12 @@ TEST(SurfaceRows, GiveWhatAllRowsGive) {
   }
 }
 
-/// Compressed columns of every `step`-th surface node, with rows for the surface, which say of
-/// themselves `claimed` times the bound that they have.
+/// Compressed columns which say of themselves `claimed` times the bound that they have.
 std::shared_ptr<ComplianceSource> compressed(const Model& model, double relative,
                                              std::size_t step = 1, double claimed = 1) {
-  const StiffnessMatrix k = stiffness_matrix(model);
-  const Factor factor(k, {});
-  const std::size_t rows = surface_count(model);
-  std::vector<Vec3> positions;
-  std::vector<std::uint32_t> nodes;
-  for (std::uint32_t i = 0; i < rows; ++i) {
-    positions.push_back(model.nodes[i].position);
-    if (i % step == 0)
-      nodes.push_back(i);
-  }
-  CompressedMade made = compress_columns(positions, nodes, relative,
-                                         [&](std::span<const std::uint32_t> of, ColumnSink& sink) {
-                                           return compliance_columns(k, factor, stiffness_norm(k),
-                                                                     of, {}, sink, rows);
-                                         },
-                                         {});
+  CompressedMade made = test::compressed_surface(model, relative, step);
   made.layout.bound *= claimed;
-  return compliance_of_store({compressed_columns(std::move(made), model.nodes.size()),
-                              [&model] { return Factor(stiffness_matrix(model), Context{}); }});
+  return test::compressed(model, std::move(made));
 }
 
 // Nodes with columns, without, and inside, in all mixtures.
