@@ -324,6 +324,18 @@ private:
     next_section();
   }
 
+  /// One of both, or both.
+  void law_and_prony(Material& m) {
+    std::string word(in_.word());
+    if (!is_prony(word)) {
+      m.law = parse_law(word);
+      if (in_.at_end())
+        return;
+      word = in_.word();
+    }
+    m.prony = parse_prony(word);
+  }
+
   void materials() {
     expect({"space", "materials"});
     const std::size_t n = count(13);
@@ -342,8 +354,8 @@ private:
       if (!in_.at_end())
         m.poisson = in_.number<double>("Poisson's ratio");
       if (!in_.at_end())
-        m.law = parse_law(in_.word());
-      in_.end_line(8);
+        law_and_prony(m);
+      in_.end_line(9);
       model_.materials.push_back(std::move(m));
       check_.material(i);
     }

@@ -105,7 +105,8 @@ void emit_model(const Sink& sink, const Model& m, const Context& context,
     sink(std::to_string(i) + " \"" + k.name + "\" " + number_text(k.density) + " " +
          number_text(k.young) + " " + number_text(k.thickness) + " " +
          number_text(k.damping_ratio) + (k.poisson ? " " + number_text(*k.poisson) : "") +
-         (k.law ? " " + law_text(*k.law) : "") + "\n");
+         (k.law ? " " + law_text(*k.law) : "") +
+         (k.prony.empty() ? "" : " " + prony_text(k.prony)) + "\n");
   }
   emit(sink, context, "nodes", m.nodes.size(), [&](std::size_t i, LineWriter& line) {
     const Node& n = m.nodes[i];

@@ -43,12 +43,16 @@ void require_solid(const Output& output, const Model& model, Kind kind) {
   if (!model.springs.empty())
     throw Error(output.name(), std::to_string(model.springs.size()) + " springs of a solid for " +
                                    format + ", which this writer has not, expected none");
-  for (const Material& material : model.materials)
+  for (const Material& material : model.materials) {
+    if (!material.prony.empty())
+      throw Error(output.name(), "material '" + material.name +
+                                     "' has a Prony series, expected none for " + format);
     if (material.law && (kind == Kind::inp || material.law->kind != HyperelasticLaw::neo_hookean))
       throw Error(output.name(), "material '" + material.name + "' has the law " +
                                      std::string(law_name(material.law->kind)) + ", expected " +
                                      (kind == Kind::inp ? "none for inp"
                                                         : "classical-neo-hookean or none for feb"));
+  }
 }
 
 /// A name of letters, digits, '_' and '-', with the material's number, so that names differ.

@@ -87,6 +87,11 @@ public:
   /// axes that the model holds.
   virtual std::vector<NodeVector> contact_forces() const = 0;
 
+  /// What a viscoelastic body remembers; nothing of others.
+  virtual std::any memory() { return {}; }
+  /// As if it had come where it is by that. \pre memory() of a body with the same elements
+  virtual void remember(const std::any& /*memory*/) {}
+
   // ---- contact
 
   /// Whether the object can make steps with contact.

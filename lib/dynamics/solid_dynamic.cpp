@@ -234,6 +234,20 @@ void SolidDynamic::set_motion(std::span<const NodeMotion> motion) {
   apply_load(state_.time);
 }
 
+std::any SolidDynamic::memory() {
+  return engine(context_).memory();
+}
+
+void SolidDynamic::remember(const std::any& memory) {
+  const auto* const state = std::any_cast<MemoryState>(&memory);
+  if (state == nullptr || !state->tensors)
+    return;
+  SolidMotion& moving = engine(context_);
+  moving.set_memory(*state);
+  moving.restore(*state_.places, *state_.velocity, context_);
+  state_.version = ++versions_;
+}
+
 std::any SolidDynamic::snapshot() const {
   State state = state_;
   if (engine_ && !behind_)
@@ -333,7 +347,7 @@ void SolidDynamic::hold_all(std::span<const double> target, double h, const Cont
       place += model_.nodes[i].position[a];
       velocity[axis_of(i, a)] = (place - engine_->places()[axis_of(i, a)]) / h;
     }
-  engine_->restore(places, velocity, context);
+  engine_->restore(places, velocity, context, h);
   engine_->find_reactions(context);
 }
 
@@ -350,7 +364,8 @@ void SolidDynamic::settle(std::span<const double> before, double to, double room
       largest = std::max(largest, std::abs(before[axis] - model_.nodes[i].position[a]));
     }
   const bool quiet = moved <= std::max({rest_tolerance * largest, rest_rounding * size_, room}) &&
-                     !moving.recovering() && !(state_.load->changes_until() > to);
+                     !moving.recovering() && !moving.fades() &&
+                     !(state_.load->changes_until() > to);
   state_.quiet = quiet ? state_.quiet + 1 : 0;
   if (state_.quiet < quiet_steps)
     return;
@@ -427,6 +442,7 @@ void SolidDynamic::end_contact_step(std::span<const contact::VertexForce> forces
   SolidMotion& moving = *engine_;
   const std::vector<double> before(moving.places().begin(), moving.places().end());
   SolidStep took;
+  MemoryState was; // no time passes while surfaces part
   if (all_held_) {
     std::vector<double> all = load_;
     for (const contact::VertexForce& f : forces)
@@ -435,6 +451,8 @@ void SolidDynamic::end_contact_step(std::span<const contact::VertexForce> forces
     moving.set_load(all);
     hold_all(target_, to_ - from_, context);
   } else {
+    if (still)
+      was = moving.memory();
     took = moving.end_step(body_->forces(), context);
   }
   state_.contact.assign(forces.begin(), forces.end());
@@ -446,6 +464,8 @@ void SolidDynamic::end_contact_step(std::span<const contact::VertexForce> forces
   counts_.factors += static_cast<std::uint64_t>(took.factorisations);
   if (still) {
     const std::vector<double> places(moving.places().begin(), moving.places().end());
+    if (was.tensors)
+      moving.set_memory(was);
     moving.restore(places, *state_.velocity, context);
     take_over();
     return;

@@ -51,6 +51,9 @@ public:
   std::span<const NodeMotion> motion() const override;
   void set_motion(std::span<const NodeMotion> motion) override;
 
+  std::any memory() override;
+  void remember(const std::any& memory) override;
+
   std::any snapshot() const override;
   void go_back(const std::any& snapshot) override;
 

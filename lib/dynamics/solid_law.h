@@ -9,8 +9,12 @@
 namespace gewebe {
 
 /// The law that is chosen; else that of the materials, where one of them has a law; else none.
-/// \throw Error naming a material whose law is another one than the chosen one, or the classical
-/// Neo-Hookean one, which does not serve here
+/// A viscoelastic material has one.
+/// \throw Error naming a material whose law is another one than the chosen one, the classical
+/// Neo-Hookean one, which does not serve here, or a viscoelastic one where corotational is chosen
 std::optional<SolidLaw> law_of(const Model& model, const std::optional<SolidLaw>& chosen);
+
+/// Whether a solid has a viscoelastic material.
+bool is_viscoelastic(const Model& model);
 
 } // namespace gewebe

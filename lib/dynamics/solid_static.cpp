@@ -1,6 +1,7 @@
 #include "dynamics/solid_static.h"
 
 #include "base/error.h"
+#include "dynamics/solid_law.h"
 #include "fem/model_stiffness.h"
 #include "fem/solid_model.h"
 #include "geometry/vector_at.h"
@@ -31,6 +32,11 @@ constexpr double least_part = 1.0 / 64;
 /// in a row that are no nearer to it than one before.
 constexpr double pressure_tolerance = 1e-7;
 constexpr int max_pressings = 40, max_astray = 6;
+/// Steps of a viscoelastic solid, over the sum of its shortest time and the time since its load
+/// changed: creep is then within 3e-4.
+constexpr double relaxation_step = 0.1;
+/// ... while the load changes, over the shortest time and over the change's own; at most so many.
+constexpr double gradual_step = 0.1, gradual_part = 1.0 / 8, most_gradual = 256;
 
 /// The load on the way between two. \param places  where nodes stood under `from`
 Load part_of_way(const Model& model, const Load& from, const Load& to,
@@ -72,6 +78,9 @@ struct SolidStatic::State {
   std::vector<std::uint32_t> vertices; // of the body
   std::unique_ptr<SolidContactBody> body;
   Load acting; // in the step with contact
+  RestTime acting_time;
+  double shortest = 0; // s, of a Prony series; 0: elastic
+  MemoryState memory;  // from which the next shape is sought
   SolidStaticCounts counts;
 
   static SolidMotionOptions options(SolidLaw law) {
@@ -88,6 +97,11 @@ struct SolidStatic::State {
         typical(contact::typical_contact(m)) {
     for (const Node& node : m.nodes)
       rest.insert(rest.end(), {node.position.x, node.position.y, node.position.z});
+    if (is_viscoelastic(m))
+      shortest = HUGE_VAL;
+    for (const Material& material : m.materials)
+      for (const PronyTerm& term : material.prony)
+        shortest = std::min(shortest, term.time);
   }
 
   std::vector<double> start() const { return answer ? answer->places : rest; }
@@ -167,6 +181,8 @@ struct SolidStatic::State {
 
   void begin(const Load& load, std::span<const double> places) {
     hold(load);
+    if (shortest > 0)
+      engine.set_memory(memory);
     engine.restore(places, std::vector<double>(places.size()), context);
     engine.set_load(forces(load, places));
     if (!load.displacement.empty())
@@ -190,8 +206,8 @@ struct SolidStatic::State {
     return turned > scrambled_part * all;
   }
 
-  bool settle() {
-    const SolidStep step = engine.settle(context);
+  bool settle(double elapsed = 0) {
+    const SolidStep step = engine.settle(context, elapsed);
     counts.rounds += static_cast<std::uint64_t>(step.rounds);
     counts.factors += static_cast<std::uint64_t>(step.factorisations);
     return step.left <= tolerance_at_rest;
@@ -209,11 +225,11 @@ struct SolidStatic::State {
   }
 
   /// As find, of hyperelastic elements: pressures are those of each round's shape.
-  bool find_hyperelastic(const Load& load, std::span<const double> places) {
+  bool find_hyperelastic(const Load& load, std::span<const double> places, double elapsed) {
     begin(load, places);
     engine.set_load(dead_forces(load));
     engine.follow(following(load));
-    const bool found = settle() && !is_inside_out();
+    const bool found = settle(elapsed) && !is_inside_out();
     engine.follow({});
     if (found && !load.pressure.empty()) {
       engine.set_load(forces(load, engine.places()));
@@ -223,9 +239,9 @@ struct SolidStatic::State {
   }
 
   /// From places to the shape under a load. \return whether it was found
-  bool find(const Load& load, std::span<const double> places) {
+  bool find(const Load& load, std::span<const double> places, double elapsed = 0) {
     if (law == SolidLaw::hyperelastic)
-      return find_hyperelastic(load, places);
+      return find_hyperelastic(load, places, elapsed);
     begin(load, places);
     if (!settle())
       return false;
@@ -270,12 +286,21 @@ struct SolidStatic::State {
     return false;
   }
 
-  void update(const Load& load) {
+  void update(const Load& load, const RestTime& time) {
     ++counts.updates;
-    if (answer && answer->balanced && answer->load == load) {
-      ++counts.unchanged;
+    const bool same = answer && answer->balanced && answer->load == load;
+    if (shortest > 0) {
+      pass(load, time, same);
       return;
     }
+    if (same)
+      ++counts.unchanged;
+    else
+      change(load);
+  }
+
+  /// To the shape under a load, at once.
+  void change(const Load& load) {
     const Load from = answer ? answer->load : Load{};
     const std::vector<double> stood = start();
     // What nothing loads is as it was at rest.
@@ -285,6 +310,7 @@ struct SolidStatic::State {
       const double next = std::min(1.0, done + part);
       if (find(part_of_way(model, from, load, stood, next), places)) {
         places.assign(engine.places().begin(), engine.places().end());
+        memory = engine.memory();
         done = next;
         part *= 2;
         continue;
@@ -298,11 +324,65 @@ struct SolidStatic::State {
     set(load);
   }
 
+  /// A viscoelastic solid on its way through this time.
+  void pass(const Load& load, const RestTime& time, bool same) {
+    RestTime span = time;
+    if (answer)
+      span.start = answer->time;
+    double since = answer ? answer->since : span.start;
+    const double duration = span.end - span.start;
+    if (same && !(duration > 0)) {
+      ++counts.unchanged;
+      return;
+    }
+    memory = answer ? answer->memory : MemoryState{};
+    if (!same && span.gradual && duration > 0) {
+      const Load from = answer ? answer->load : Load{};
+      const std::vector<double> stood = start();
+      const double least = std::max(gradual_step * shortest, duration / most_gradual),
+                   count = std::ceil(duration / std::min(least, gradual_part * duration));
+      std::vector<double> places = stood;
+      for (double k = 0; k < count; ++k) {
+        relax(part_of_way(model, from, load, stood, k + 1 < count ? (k + 1) / count : 1), places,
+              duration / count, span.start + duration * (k + 1) / count);
+        places.assign(engine.places().begin(), engine.places().end());
+      }
+      set(load, false, span.end, span.end);
+      return;
+    }
+    if (!same) {
+      change(load);
+      since = span.start;
+    }
+    std::vector<double> places = start();
+    double at = span.start;
+    while (at < span.end) {
+      const double left = span.end - at,
+                   h = std::min(left, relaxation_step * (shortest + (at - since)));
+      at = left <= 1.5 * h ? span.end : at + h;
+      relax(load, places, left <= 1.5 * h ? left : h, at);
+      places.assign(engine.places().begin(), engine.places().end());
+    }
+    set(load, false, span.end, since);
+  }
+
+  void relax(const Load& load, std::span<const double> places, double elapsed, double at) {
+    if (!find(load, places, elapsed))
+      throw Error("no shape at rest is found of what has relaxed until " + number_text(at) +
+                  " s, expected a smaller load, or more steps");
+    memory = engine.memory();
+  }
+
   /// The engine's state is the answer.
-  void set(const Load& load, bool sharp = false) {
+  void set(const Load& load, bool sharp = false, double time = 0, double since = 0) {
     auto next = std::make_shared<SolidRest>();
     next->load = load;
     next->sharp = sharp;
+    if (shortest > 0) {
+      next->memory = engine.memory();
+      next->time = time;
+      next->since = since;
+    }
     next->places.assign(engine.places().begin(), engine.places().end());
     next->reactions.assign(engine.reactions().begin(), engine.reactions().end());
     take(std::move(next));
@@ -315,10 +395,15 @@ struct SolidStatic::State {
 
   // ---- contact
 
-  contact::ContactBody& begin_contact(const Load& load, std::vector<contact::VertexForce> last) {
+  contact::ContactBody& begin_contact(const Load& load, std::vector<contact::VertexForce> last,
+                                      const RestTime& time) {
     acting = load;
+    acting_time = time;
+    if (answer)
+      acting_time.start = answer->time;
+    memory = answer ? answer->memory : MemoryState{};
     begin(load, start());
-    engine.begin_step(HUGE_VAL, context);
+    engine.begin_step(HUGE_VAL, context, std::max(0.0, acting_time.end - acting_time.start));
     if (answer && answer->sharp)
       engine.sharpen();
     if (!body) {
@@ -346,7 +431,7 @@ struct SolidStatic::State {
     for (std::uint32_t node = 0; node < model.nodes.size(); ++node)
       if (const Vec3 f = vector_at(std::span<const double>(touching), node); f != Vec3{})
         acting.force[node] += f;
-    set(acting, sharp);
+    set(acting, sharp, acting_time.end, acting_time.end);
   }
 };
 
@@ -355,8 +440,8 @@ SolidStatic::SolidStatic(const Model& model, SolidLaw law, const Context& contex
 SolidStatic::~SolidStatic() = default;
 SolidStatic::SolidStatic(SolidStatic&&) noexcept = default;
 
-void SolidStatic::update(const Load& load) {
-  state_->update(load);
+void SolidStatic::update(const Load& load, const RestTime& time) {
+  state_->update(load, time);
 }
 
 void SolidStatic::prepare(const Load& load) {
@@ -404,8 +489,9 @@ std::vector<NodeVector> SolidStatic::holding_forces() const {
 }
 
 contact::ContactBody& SolidStatic::begin_contact(const Load& load,
-                                                 std::vector<contact::VertexForce> last) {
-  return state_->begin_contact(load, std::move(last));
+                                                 std::vector<contact::VertexForce> last,
+                                                 const RestTime& time) {
+  return state_->begin_contact(load, std::move(last), time);
 }
 
 void SolidStatic::end_contact() {

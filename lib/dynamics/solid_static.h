@@ -10,6 +10,11 @@
 // With contact the same step is taken in parts, as that of a moving solid (solid_contact_body.h):
 // rounds of quadratic models, each with the forces of all bodies that touch.
 //
+// A viscoelastic solid rests in a time that passes: a load that changes acts suddenly at the start
+// of that time, or changes over it, and then the shape relaxes in steps that grow as the time since
+// the change does, each a minimum too (viscous/solid_memory.h). In contact, a part of the way is
+// one such step.
+//
 // An answer is a value, from which the next one is sought, and a rollback restores it. The same
 // answer and load give the same next one, to the bit.
 
@@ -36,6 +41,16 @@ struct SolidRest {
   std::vector<double> reactions; ///< on held axes, 3 n, else 0
   bool balanced = true;          ///< else only the start of the next one, as behind a cut
   bool sharp = false;            ///< contact took a tangent: the next one begins with its own
+  // Of a viscoelastic solid:
+  MemoryState memory{};
+  double time = 0;  ///< s, of this shape
+  double since = 0; ///< ... and of the last change of its load
+};
+
+/// The time that passes until an answer.
+struct RestTime {
+  double start = 0, end = 0; ///< s; start: if there is no answer yet
+  bool gradual = false;      ///< the load changes over this time; else at its start
 };
 
 /// Work of a SolidStatic.
@@ -58,7 +73,8 @@ public:
   /// the model holds \throw SingularStiffness if what holds the model and the load leaves it free
   /// to move \throw Error if no shape is found, with the share of the way to the load that was;
   /// Cancelled
-  void update(const Load& load);
+  /// \param time  of a viscoelastic solid
+  void update(const Load& load, const RestTime& time = {});
   /// Makes what the first update under this load needs. \throw as update
   void prepare(const Load& load);
   std::shared_ptr<const SolidRest> answer() const noexcept;
@@ -74,7 +90,9 @@ public:
   /// begun is abandoned. Vertices are those of contact::model_surface.
   /// \param last  contact forces at its beginning \return valid until the next step
   /// \throw as update
-  contact::ContactBody& begin_contact(const Load& load, std::vector<contact::VertexForce> last);
+  /// \param time  at the end of the step, of a viscoelastic solid
+  contact::ContactBody& begin_contact(const Load& load, std::vector<contact::VertexForce> last,
+                                      const RestTime& time = {});
   /// Ends it: the answer is where contact has moved the body to.
   void end_contact();
 

@@ -9,6 +9,7 @@
 #include "base/context.h"
 #include "fem/element.h"
 #include "linalg/stiffness.h"
+#include "model/prony.h"
 #include "tetrahedra/boundary.h"
 #include "tetrahedra/tet_mesh.h"
 
@@ -23,6 +24,8 @@ struct SolidMaterial {
   double poisson = 0.49; ///< Poisson's ratio, 0 to below 1/2
   double density = 1e-3; ///< g/mm³
   HyperelasticLaw law{}; ///< of large strains (fem/hyperelastic.h)
+  /// None: elastic. Read where a body is made of it (viscous/solid_memory.h).
+  std::span<const PronyTerm> prony{};
 };
 
 /// The elements of a mesh whose tetrahedra are of materials[mesh.material[t]], or all of the first.

@@ -51,6 +51,19 @@ Elasticity elasticity(double young, double poisson);
 /// A 3 × 3 matrix by rows.
 using SolidBlock = std::array<double, 9>;
 
+/// Six components of a symmetric tensor: xx, yy, zz, xy, yz, zx.
+using SymmetricTensor = std::array<double, 6>;
+
+/// What a viscoelastic element remembers of earlier strains, as it acts in one step
+/// (viscous/solid_memory.h): with W_d = W - mu/3 (J - 1)² of fem/hyperelastic.h, its energy per
+/// volume has share W_d + A : (C - I) / 2 in place of W_d.
+struct ElementMemory {
+  double share = 1;
+  std::span<const SymmetricTensor> stress{}; ///< A at each point, Pa; none: an elastic element
+
+  bool acts() const noexcept { return !stress.empty(); }
+};
+
 /// What the integrals of one tetrahedron are made of.
 struct SolidElement {
   double volume = 0;              ///< mm³
@@ -58,6 +71,7 @@ struct SolidElement {
   Elasticity material;
   SymmetricBlock bubble_flexibility{}; ///< (∫b)² times the inverse of the bubble's own stiffness
   HyperelasticLaw law;                 ///< of large strains (fem/hyperelastic.h)
+  ElementMemory memory{};              ///< ... of the step that is open
 };
 
 /// \throw Error unless the volume is finite and positive (as the corners are ordered)

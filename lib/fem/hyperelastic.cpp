@@ -5,7 +5,6 @@
 #include "fem/hyperelastic_points_internal.h"
 #include "fem/matrix3_internal.h"
 #include "fem/modified_law_internal.h"
-#include "numeric/logarithm.h"
 #include "tetrahedra/tet_mesh.h"
 
 #include <Eigen/Cholesky>
@@ -53,6 +52,9 @@ const std::vector<IntegrationPoint>& quadratic_points() {
 
 namespace {
 
+/// Of J: below it a point's stress S has no bounds.
+constexpr double least_sound_volume = 0.1;
+
 std::span<const IntegrationPoint> points_of(bool quadratic) {
   static const std::vector<IntegrationPoint> one{{{0.25, 0.25, 0.25, 0.25}, 1}};
   return quadratic ? quadratic_points() : one;
@@ -95,36 +97,12 @@ SolidBlock cofactors(const SolidBlock& f) {
           f[1] * f[5] - f[2] * f[4], f[2] * f[3] - f[0] * f[5], f[0] * f[4] - f[1] * f[3]};
 }
 
-/// Of Neo-Hookean laws dW/dF = a F + d cof F and d²W/dF² = a 1 + b F ⊗ F + c cof F ⊗ cof F + d
-/// d²J/dF².
-struct Derivatives {
-  double energy = 0, a = 0, b = 0, c = 0, d = 0;
-};
-
-bool is_neo_hookean(const HyperelasticLaw& law) {
-  return law.kind == HyperelasticLaw::stable_neo_hookean ||
-         law.kind == HyperelasticLaw::neo_hookean;
-}
-
-Derivatives derivatives(const HyperelasticLaw& law, double mu, double i_c, double j) {
-  if (law.kind == HyperelasticLaw::neo_hookean) {
-    if (!(j > 0))
-      return {.energy = HUGE_VAL};
-    return {mu / 2 * (i_c - 3) - mu * natural_logarithm(j), mu, 0, mu / (j * j), -mu / j};
-  }
-  const double shear = 2.0 / 3 * mu, below = i_c + 1;
-  return {shear * (i_c - 3) - shear * natural_logarithm(below / 4) - mu * (j - 1) +
-              5.0 / 12 * mu * (j - 1) * (j - 1),
-          2 * shear * (1 - 1 / below), 4 * shear / (below * below), 5.0 / 6 * mu,
-          -mu + 5.0 / 6 * mu * (j - 1)};
-}
-
 /// What is known of a point before it is summed.
 struct Point {
   double weight = 0; ///< times the volume
   Gradients gradient;
   SolidBlock f, cofactor;
-  Derivatives w;
+  NeoHookeanLaw w;
 };
 
 /// The second derivative by F, its pressure held.
@@ -203,7 +181,8 @@ void hyperelastic_response(const SolidElement& element, std::span<const Vec3> u,
   const double mu = element.material.mu;
   const std::span<const IntegrationPoint> at = points_of(quadratic);
   const HyperelasticLaw& law = element.law;
-  const bool neo_hookean = is_neo_hookean(law), wants_second = part >= HyperelasticPart::tangent;
+  const bool neo_hookean = is_neo_hookean(law) && !element.memory.acts(),
+             wants_second = part >= HyperelasticPart::tangent;
   std::array<Point, 24> points;
   std::vector<LawResponse> modified(neo_hookean ? 0 : at.size());
   std::array<double, 4> moment{}; // ∫ λp J over the volume
@@ -224,9 +203,11 @@ void hyperelastic_response(const SolidElement& element, std::span<const Vec3> u,
       double i_c = 0;
       for (const double value : q.f)
         i_c += value * value;
-      q.w = derivatives(law, mu, i_c, j);
+      q.w = neo_hookean_law(law, mu, i_c, j);
     } else {
-      modified_law(law, mu, q.f, q.cofactor, j, wants_second, modified[n]);
+      law_at(law, mu, q.f, q.cofactor, j, wants_second, modified[n]);
+      if (element.memory.acts())
+        remember(element.memory, n, mu, q.f, q.cofactor, j, wants_second, modified[n]);
       q.w.energy = modified[n].energy;
     }
     if (q.w.energy == HUGE_VAL) {
@@ -314,7 +295,8 @@ namespace {
 class BubbleEnergy {
 public:
   BubbleEnergy(const SolidElement& element, std::span<const Vec3> u)
-      : mu_(element.material.mu), law_(element.law), neo_hookean_(is_neo_hookean(law_)) {
+      : mu_(element.material.mu), law_(element.law), memory_(element.memory),
+        neo_hookean_(is_neo_hookean(law_) && !memory_.acts()) {
     const std::span<const IntegrationPoint> at = points_of(true);
     std::array<double, 4> moment{};
     std::array<Eigen::Vector3d, 4> slope;
@@ -358,11 +340,11 @@ public:
     energy_ = constant_ + w.dot(linear_) + w.dot(square_ * w) / 2;
     gradient_ = linear_ + square_ * w;
     second_ = square_;
-    for (const Part& q : parts_)
+    for (std::size_t n = 0; n < parts_.size(); ++n)
       if (neo_hookean_)
-        add_neo_hookean(q, w);
+        add_neo_hookean(parts_[n], w);
       else
-        add_modified(q, w);
+        add_modified(parts_[n], n, w);
     if (!std::isfinite(energy_))
       energy_ = HUGE_VAL;
     else if (!neo_hookean_)
@@ -382,20 +364,24 @@ private:
 
   void add_neo_hookean(const Part& q, const Eigen::Vector3d& w) {
     const Eigen::Vector3d along = q.along + q.square * w;
-    const Derivatives d =
-        derivatives(law_, mu_, q.i_c + w.dot(q.along + along), q.j + w.dot(q.of_j));
+    const NeoHookeanLaw d =
+        neo_hookean_law(law_, mu_, q.i_c + w.dot(q.along + along), q.j + w.dot(q.of_j));
     energy_ += q.weight * d.energy;
     gradient_ += q.weight * (d.a * along + d.d * q.of_j);
     second_ += q.weight * (d.b * along * along.transpose() + d.c * q.of_j * q.of_j.transpose());
     second_.diagonal().array() += q.weight * q.square * (d.a + 1e-9 * mu_); // definite if flat
   }
 
-  void add_modified(const Part& q, const Eigen::Vector3d& w) {
+  void add_modified(const Part& q, std::size_t n, const Eigen::Vector3d& w) {
     SolidBlock f = q.f;
     for (int i = 0; i < 3; ++i)
       for (int j = 0; j < 3; ++j)
         f[static_cast<std::size_t>(3 * i + j)] += w[i] * q.gradient[j];
-    modified_law(law_, mu_, f, cofactors(f), q.j + w.dot(q.of_j), true, modified_);
+    const SolidBlock cofactor = cofactors(f);
+    const double j = q.j + w.dot(q.of_j);
+    law_at(law_, mu_, f, cofactor, j, true, modified_);
+    if (memory_.acts())
+      remember(memory_, n, mu_, f, cofactor, j, true, modified_);
     energy_ += q.weight * modified_.energy;
     gradient_ += q.weight * eigen(product(modified_.stress, q.gradient));
     for (int i = 0; i < 3; ++i)
@@ -420,6 +406,7 @@ private:
 
   double mu_, constant_ = 0, energy_ = 0;
   HyperelasticLaw law_;
+  ElementMemory memory_;
   bool neo_hookean_;
   LawResponse modified_;
   std::array<Part, 24> parts_;
@@ -451,6 +438,44 @@ Vec3 settled_bubble(const SolidElement& element, std::span<const Vec3> u, const 
     energy = next;
   }
   return {w[0], w[1], w[2]};
+}
+
+void point_states(const SolidElement& element, std::span<const Vec3> u, const Vec3& bubble,
+                  std::span<HyperelasticPointState> to) {
+  const bool quadratic = u.size() == 10;
+  const std::span<const IntegrationPoint> at = points_of(quadratic);
+  const double mu = element.material.mu;
+  LawResponse law;
+  for (std::size_t n = 0; n < at.size(); ++n) {
+    HyperelasticPointState& q = to[n];
+    q.weight = at[n].weight * element.volume;
+    const Gradients gradient = gradients_at(element, at[n].at, quadratic);
+    SolidBlock f{1, 0, 0, 0, 1, 0, 0, 0, 1};
+    for (std::size_t a = 0; a < (quadratic ? 11 : 4); ++a)
+      for (int i = 0; i < 3; ++i)
+        for (int j = 0; j < 3; ++j)
+          f[static_cast<std::size_t>(3 * i + j)] += (a < 10 ? u[a] : bubble)[i] * gradient[a][j];
+    const SolidBlock cofactor = cofactors(f);
+    const double j = f[0] * cofactor[0] + f[1] * cofactor[1] + f[2] * cofactor[2];
+    law_at(element.law, mu, f, cofactor, j, false, law);
+    q.energy = law.energy - mu / 3 * (j - 1) * (j - 1);
+    q.is_sound = j >= least_sound_volume && std::isfinite(q.energy);
+    constexpr std::array<std::array<std::size_t, 2>, 6> axes{
+        {{0, 0}, {1, 1}, {2, 2}, {0, 1}, {1, 2}, {2, 0}}};
+    // S = F⁻¹ dW_d/dF, F⁻¹ = (cof F)ᵀ / J.
+    const auto s = [&](std::size_t a, std::size_t b) {
+      double sum = 0;
+      for (std::size_t k = 0; k < 3; ++k)
+        sum += cofactor[3 * k + a] *
+               (law.stress[3 * k + b] - 2 * mu / 3 * (j - 1) * cofactor[3 * k + b]);
+      return sum / j;
+    };
+    for (std::size_t k = 0; k < 6; ++k) {
+      const auto [a, b] = axes[k];
+      q.stress[k] = q.is_sound ? (s(a, b) + s(b, a)) / 2 : 0;
+      q.strain[k] = f[a] * f[b] + f[3 + a] * f[3 + b] + f[6 + a] * f[6 + b] - (a == b ? 1 : 0);
+    }
+  }
 }
 
 void hyperelastic_body_load(const SolidElement& element, const Vec3& force_density,

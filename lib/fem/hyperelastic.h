@@ -40,6 +40,8 @@
 // Quadratic elements are integrated by 24 points that are exact to degree 6 (Keast, Moderate-degree
 // tetrahedral quadrature formulas, 1986), as the bubble's stiffness at rest requires.
 //
+// A viscoelastic element has in each step the energy of fem/element.h's ElementMemory.
+//
 // Units: mm, Pa, forces g mm/s², energies g mm²/s² (1e-9 J).
 
 #include "fem/element.h"
@@ -116,6 +118,19 @@ void hyperelastic_forces(std::span<const SolidElement> elements, std::size_t nod
 /// lies downhill. What is left of the force on it is of the second order in the energy's rounding.
 /// `start` itself where its energy isn't finite. \pre u.size() is 10, all finite
 Vec3 settled_bubble(const SolidElement& element, std::span<const Vec3> u, const Vec3& start);
+
+/// One point of an element without its memory.
+struct HyperelasticPointState {
+  double weight = 0; ///< mm³ at rest
+  double energy = 0; ///< W_d = W - mu/3 (J - 1)² per volume, which a viscoelastic element relaxes
+  SymmetricTensor stress{}; ///< S = 2 dW_d/dC, Pa
+  SymmetricTensor strain{}; ///< C - I
+  bool is_sound = true;     ///< J is 0.1 at least; else the stress is 0
+};
+
+/// Of the point of a linear element, or the 24 of a quadratic one. \pre u.size() is 4 or 10
+void point_states(const SolidElement& element, std::span<const Vec3> u, const Vec3& bubble,
+                  std::span<HyperelasticPointState> to);
 
 /// The forces that a force per volume at rest puts on the nodes, and on the bubble as the last.
 /// \pre force.size() is 4 (no bubble) or 11

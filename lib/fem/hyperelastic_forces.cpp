@@ -98,9 +98,10 @@ void hyperelastic_forces(std::span<const SolidElement> elements, std::size_t nod
     respond_alone(elements[t], std::span(u[t]).first(nodes), bubbles[t],
                   own.empty() ? nullptr : &own[t], forces[t]);
   };
-  const bool side_by_side = nodes == 10 && std::ranges::all_of(elements, [](const SolidElement& e) {
-                              return e.law.kind == HyperelasticLaw::stable_neo_hookean;
-                            });
+  const bool side_by_side =
+      nodes == 10 && std::ranges::all_of(elements, [](const SolidElement& e) {
+        return e.law.kind == HyperelasticLaw::stable_neo_hookean && !e.memory.acts();
+      });
   if (!side_by_side) {
     for (std::size_t t = 0; t < elements.size(); ++t)
       alone(t);

@@ -1,5 +1,6 @@
 #include "fem/matrix3_internal.h"
 #include "fem/modified_law_internal.h"
+#include "numeric/logarithm.h"
 #include "numeric/power.h"
 
 #include <Eigen/Eigenvalues>
@@ -274,6 +275,66 @@ void modified_law(const HyperelasticLaw& law, double mu, const SolidBlock& f,
     }
   }
   sum.add_common(mu);
+}
+
+bool is_neo_hookean(const HyperelasticLaw& law) {
+  return law.kind == HyperelasticLaw::stable_neo_hookean ||
+         law.kind == HyperelasticLaw::neo_hookean;
+}
+
+NeoHookeanLaw neo_hookean_law(const HyperelasticLaw& law, double mu, double i_c, double j) {
+  if (law.kind == HyperelasticLaw::neo_hookean) {
+    if (!(j > 0))
+      return {.energy = HUGE_VAL};
+    return {mu / 2 * (i_c - 3) - mu * natural_logarithm(j), mu, 0, mu / (j * j), -mu / j};
+  }
+  const double shear = 2.0 / 3 * mu, below = i_c + 1;
+  return {shear * (i_c - 3) - shear * natural_logarithm(below / 4) - mu * (j - 1) +
+              5.0 / 12 * mu * (j - 1) * (j - 1),
+          2 * shear * (1 - 1 / below), 4 * shear / (below * below), 5.0 / 6 * mu,
+          -mu + 5.0 / 6 * mu * (j - 1)};
+}
+
+void law_at(const HyperelasticLaw& law, double mu, const SolidBlock& f, const SolidBlock& cofactor,
+            double j, bool wants_second, LawResponse& response) {
+  if (!is_neo_hookean(law)) {
+    modified_law(law, mu, f, cofactor, j, wants_second, response);
+    return;
+  }
+  double i_c = 0;
+  for (const double value : f)
+    i_c += value * value;
+  const NeoHookeanLaw w = neo_hookean_law(law, mu, i_c, j);
+  response.energy = w.energy;
+  for (std::size_t k = 0; k < 9; ++k)
+    response.stress[k] = w.a * f[k] + w.d * cofactor[k];
+  if (!wants_second)
+    return;
+  const Eigen::Map<const Vector9> by_rows(f.data()), of_j(cofactor.data());
+  response.second = SecondDerivative::Identity() * w.a;
+  response.second += w.b * by_rows * by_rows.transpose() + w.c * of_j * of_j.transpose();
+  add_cofactor_slope(f, w.d, response.second);
+}
+
+void remember(const ElementMemory& memory, std::size_t n, double mu, const SolidBlock& f,
+              const SolidBlock& cofactor, double j, bool wants_second, LawResponse& response) {
+  const double left = 1 - memory.share, off = j - 1;
+  const auto& [xx, yy, zz, xy, yz, zx] = memory.stress[n];
+  Matrix3 a;
+  a << xx, xy, zx, xy, yy, yz, zx, yz, zz;
+  const Matrix3 deformation = matrix(f), p = deformation * a;
+  const Eigen::Map<const Vector9> of_history(p.data()), of_j(cofactor.data());
+  Eigen::Map<Vector9> stress(response.stress.data());
+  const Matrix3 c = deformation.transpose() * deformation - Matrix3::Identity();
+  response.energy =
+      memory.share * response.energy + left * mu / 3 * off * off + a.cwiseProduct(c).sum() / 2;
+  stress = memory.share * stress + left * 2 * mu / 3 * off * of_j + of_history;
+  if (!wants_second)
+    return;
+  response.second = memory.share * response.second + left * 2 * mu / 3 * of_j * of_j.transpose();
+  add_cofactor_slope(f, left * 2 * mu / 3 * off, response.second);
+  for (int i = 0; i < 3; ++i)
+    response.second.block<3, 3>(3 * i, 3 * i) += a;
 }
 
 } // namespace gewebe

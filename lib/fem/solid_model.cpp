@@ -119,7 +119,7 @@ std::vector<SolidMaterial> element_materials(const Model& model) {
     if (used[m] != 0 && !of.poisson)
       throw Error("the material '" + of.name + "' has no Poisson's ratio, expected one");
     materials[m] = {of.young, of.poisson.value_or(0), of.density,
-                    of.law.value_or(HyperelasticLaw{})};
+                    of.law.value_or(HyperelasticLaw{}), of.prony};
   }
   return materials;
 }

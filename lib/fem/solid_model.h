@@ -30,7 +30,8 @@ Model solid_model(TetMesh mesh, const SolidModelOptions& options, const Context&
 
 /// The elements of a model as a mesh whose points are its nodes, all of them.
 TetMesh element_mesh(const Model& model);
-/// A material without a law is stable Neo-Hookean under large strains.
+/// A material without a law is stable Neo-Hookean under large strains. Prony series stay those of
+/// the model, which outlives the result.
 /// \pre check_model(model) passes, each material that an element has has a Poisson's ratio
 std::vector<SolidMaterial> element_materials(const Model& model);
 

@@ -65,6 +65,7 @@ MotionRecovery::MotionRecovery(const MotionBody& body, std::span<const SolidMate
       m.young *= stiffness / (1 + m.poisson);
       m.poisson = 0;
       m.law = {};
+      m.prony = {};
       materials_.push_back(m);
     }
   double volume = 0, shear = 0, mass = 0;

@@ -11,6 +11,7 @@
 #include "integrator/motion_recovery_internal.h"
 #include "integrator/motion_tangent_internal.h"
 #include "integrator/solid_energy_internal.h"
+#include "viscous/solid_memory.h"
 
 #include <algorithm>
 #include <array>
@@ -58,6 +59,7 @@ struct SolidMotion::State {
   SolidMotionOptions options;
   MotionBody body;
   MotionState now;
+  SolidMemory memory;
   SolidEnergy energy;
   double elastic = 0;      ///< energy of now.place
   double allowed = 0;      ///< at the end of the last step, of all kinds
@@ -102,11 +104,15 @@ struct SolidMotion::State {
   State(const TetMesh& mesh, std::span<const SolidMaterial> materials, const SolidNet& net,
         const SolidMotionOptions& with, const Context& context)
       : options(with), body(body_of(mesh, materials, net, with.drag, context)),
-        energy(body, net, with), recovery(body, materials, net, with) {
+        memory(body.mesh, materials, body.elements), energy(body, net, with),
+        recovery(body, materials, net, with) {
     const std::size_t axes = body.axes();
     now = {body.rest, Numbers(axes), Numbers(axes), std::vector<std::uint8_t>(axes)};
     target = reactions = Numbers(axes);
   }
+  void recall(double h, const Context& context);
+  void remember(const Context& context);
+  void stand(double elapsed, const Context& context);
   bool take_tangent();
   void renew_matrix(const Context& context);
   void solve_open(Numbers& v, const Context& context);
@@ -151,6 +157,38 @@ SolidMotion::SolidMotion(const TetMesh& mesh, std::span<const SolidMaterial> mat
   Numbers forces(state_->body.axes()); // springs need not be at rest
   state_->elastic = state_->energy.evaluate(state_->now.place, {}, forces, context);
   state_->energy.keep();
+}
+
+/// Elements have the energy of a step of h from now on, and `elastic` is that of the place in it.
+void SolidMotion::State::recall(double h, const Context& context) {
+  if (memory.empty())
+    return;
+  memory.begin(h);
+  Numbers forces(body.axes());
+  elastic = energy.evaluate(now.place, {}, forces, context);
+}
+
+/// Ends what recall() began, at the place of the last evaluation: `elastic` becomes what is stored.
+void SolidMotion::State::remember(const Context& context) {
+  if (memory.empty())
+    return;
+  Numbers u = now.place;
+  add(u, -1, body.rest);
+  std::vector<Vec3> bubbles(body.mesh.middles.empty() ? 0 : body.elements.size());
+  for (std::size_t t = 0; t < bubbles.size(); ++t)
+    bubbles[t] = energy.bubble(t);
+  memory.end(u, bubbles, context);
+  elastic += memory.beyond();
+}
+
+/// At a place that it has come to in this time.
+void SolidMotion::State::stand(double elapsed, const Context& context) {
+  if (!memory.empty())
+    memory.begin(elapsed);
+  Numbers forces(body.axes());
+  elastic = energy.evaluate(now.place, {}, forces, context);
+  energy.keep();
+  remember(context);
 }
 
 /// Speeds at the end of a step.
@@ -422,6 +460,7 @@ SolidStep SolidMotion::step(double h, const Context& context) {
   s.recovery.look(s.body, s.now, s.elastic, h, s.options, context);
   if (s.recovery.on())
     return s.step_softly(h, context);
+  s.recall(h, context);
   SolidStep step;
   step.change = step.left = HUGE_VAL;
   if (!s.options.reference)
@@ -453,6 +492,7 @@ SolidStep SolidMotion::step(double h, const Context& context) {
   s.elastic = s.energy.elastic(); // of the last evaluation, momentum kept by a translation alone
   if (!s.moved)
     s.limit(step);
+  s.remember(context);
   step.evaluations = objective.evaluations();
   s.last_step = h;
   s.moved = false;
@@ -463,8 +503,8 @@ void SolidMotion::follow(std::vector<FollowingForce> forces) {
   state_->following = std::move(forces);
 }
 
-SolidStep SolidMotion::settle(const Context& context) {
-  begin_step(HUGE_VAL, context);
+SolidStep SolidMotion::settle(const Context& context, double elapsed) {
+  begin_step(HUGE_VAL, context, elapsed);
   solve_alone(context);
   const SolidStep found = state_->open->counts;
   SolidStep step = end_step({}, context);
@@ -479,7 +519,7 @@ double SolidMotion::condition(const Context& context) {
   return s.quick.condition();
 }
 
-void SolidMotion::begin_step(double h, const Context& context) {
+void SolidMotion::begin_step(double h, const Context& context, double elapsed) {
   State& s = *state_;
   s.open.reset();
   s.energy.set_at_rest(!std::isfinite(h));
@@ -495,6 +535,7 @@ void SolidMotion::begin_step(double h, const Context& context) {
     soft.begin_step(h, context);
     return;
   }
+  s.recall(std::isfinite(h) ? h : elapsed, context);
   const int made = s.quick.prepare(s.body, s.energy.springs(), s.now.held, h, s.options, context);
   s.open.emplace(State::Open{.objective = MotionObjective(s.body, s.now, s.energy, h, s.options),
                              .point = {},
@@ -758,6 +799,7 @@ SolidStep SolidMotion::end_step(std::span<const double> forces, const Context& c
     s.forecast.add(std::move(acceleration), s.body.masses, context);
   s.now.place = std::move(open.found.at);
   s.elastic = s.energy.elastic();
+  s.remember(context);
   s.last_step = h;
   s.moved = false;
   open.counts.evaluations = open.objective.evaluations();
@@ -791,7 +833,7 @@ void SolidMotion::set_state(std::span<const double> displacement, std::span<cons
 }
 
 void SolidMotion::restore(std::span<const double> places, std::span<const double> velocity,
-                          const Context& context) {
+                          const Context& context, double elapsed) {
   State& s = *state_;
   s.quick.drop_tangent();
   s.quick.forget();
@@ -802,13 +844,22 @@ void SolidMotion::restore(std::span<const double> places, std::span<const double
   s.forecast.clear();
   s.energy.forget_bubbles();
   s.last_step = 0;
-  Numbers forces(s.body.axes());
-  s.elastic = s.energy.evaluate(s.now.place, {}, forces, context);
-  s.energy.keep();
+  s.stand(elapsed, context);
+}
+
+MemoryState SolidMotion::memory() const {
+  return state_->memory.state();
+}
+void SolidMotion::set_memory(const MemoryState& memory) {
+  state_->memory.restore(memory);
+}
+bool SolidMotion::fades() const noexcept {
+  return !state_->memory.empty() && !state_->memory.still();
 }
 
 struct SolidMotion::Past {
   KeptStep energy;
+  MemoryState memory;
   double elastic = 0, last_step = 0;
   MotionForecast forecast;
   MotionQuick::Past quick;
@@ -819,6 +870,7 @@ struct SolidMotion::Past {
 std::shared_ptr<const SolidMotion::Past> SolidMotion::past() const {
   const State& s = *state_;
   auto past = std::make_shared<Past>(Past{.energy = s.energy.kept(),
+                                          .memory = s.memory.state(),
                                           .elastic = s.elastic,
                                           .last_step = s.last_step,
                                           .forecast = s.forecast,
@@ -840,6 +892,7 @@ void SolidMotion::restore(std::span<const double> places, std::span<const double
   std::ranges::copy(velocity, s.now.velocity.begin());
   std::ranges::copy(held, s.now.held.begin());
   s.energy.restore(past.energy);
+  s.memory.restore(past.memory);
   s.elastic = past.elastic;
   s.last_step = past.last_step;
   s.forecast = past.forecast;
@@ -861,7 +914,9 @@ void SolidMotion::find_reactions(const Context& context) {
     return;
   }
   Numbers forces(s.body.axes());
-  s.elastic = s.energy.evaluate(s.now.place, {}, forces, context);
+  if (!s.memory.empty())
+    s.memory.begin(0);
+  s.elastic = s.energy.evaluate(s.now.place, {}, forces, context) + s.memory.beyond_sudden();
   for (std::size_t axis = 0; axis < s.body.axes(); ++axis)
     s.reactions[axis] = s.now.held[axis] != 0 ? -forces[axis] - s.now.load[axis] : 0;
 }

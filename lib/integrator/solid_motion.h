@@ -45,6 +45,10 @@
 // The constant matrix has their stiffness along every axis, which bounds them however they turn: of
 // springs alone, held by whole nodes, it is one of nodes that serves each axis.
 //
+// Viscoelastic elements (viscous/solid_memory.h) have another energy in each step, so that the same
+// minimum is sought. The energies reported are those stored. A body that finds back
+// remembers nothing new meanwhile.
+//
 // Damping is Rayleigh's: `drag` (1/s) by masses, `damping` (s) by the stiffness, but in the
 // elements' own frames, so that rotations aren't slowed down.
 //
@@ -53,6 +57,7 @@
 #include "base/context.h"
 #include "fem/assembly.h"
 #include "tetrahedra/tet_mesh.h"
+#include "viscous/solid_memory.h"
 
 #include <array>
 #include <cstdint>
@@ -163,7 +168,8 @@ public:
   /// tolerance, of the displacement from rest, or `left` says more. It doesn't depend on steps
   /// before. \throw NotPositiveDefinite if what is held leaves the body free to move; as Factor;
   /// Cancelled
-  SolidStep settle(const Context& context);
+  /// \param elapsed  s, in which a viscoelastic body comes there; else it is sudden
+  SolidStep settle(const Context& context, double elapsed = 0);
   /// Lower estimate of the condition of the stiffness at rest with what is held now, 1e12 or more
   /// if the body is free to move. \throw as settle
   double condition(const Context& context);
@@ -180,12 +186,19 @@ public:
   std::vector<double> displacement() const;          ///< 3 n, mm
   std::span<const double> velocity() const noexcept; ///< 3 n
   /// Another state. \pre 3 n each, finite
+  /// A viscoelastic body remembers that it has come there suddenly.
   void set_state(std::span<const double> displacement, std::span<const double> velocity,
                  const Context& context = {});
   /// As set_state, with the places of nodes, as places() and velocity() returned them: equal to the
-  /// bit.
+  /// bit. \param elapsed  as of settle()
   void restore(std::span<const double> places, std::span<const double> velocity,
-               const Context& context = {});
+               const Context& context = {}, double elapsed = 0);
+  /// What a viscoelastic body remembers.
+  MemoryState memory() const;
+  /// As if it had come where it is by this, until it is moved. \pre memory() of such a body
+  void set_memory(const MemoryState& memory);
+  /// Whether it is viscoelastic and the last step changed its memory.
+  bool fades() const noexcept;
   /// What earlier steps leave to the next ones, beside places and velocities: secants,
   /// accelerations, strains that damping counts from, whether a tangent serves on. Copies share it.
   struct Past;
@@ -209,7 +222,8 @@ public:
   /// Begins a step of h, which may be infinite (see settle); the iterate is the present position.
   /// An open step is abandoned without a trace. \pre h > 0, set_load and move_held were called for
   /// this step \throw as step
-  void begin_step(double h, const Context& context);
+  /// \param elapsed  as of settle(), of an infinite h
+  void begin_step(double h, const Context& context, double elapsed = 0);
   /// Builds the model around the iterate, at first around where the motion leads.
   /// \param forces  f_0 that act beside the load, 3 n
   /// \param step  becomes x_free + A^-1 f_0 minus the iterate, 3 n; on held axes the way to their

@@ -61,6 +61,7 @@ public:
     for (Material& material : model_.materials) { // springs have none
       material.poisson.reset();
       material.law.reset();
+      material.prony.clear();
     }
     areas_and_materials();
     surface_nodes();

@@ -62,6 +62,9 @@ void ModelChecker::material(std::size_t i) const {
     throw Error("a law without a Poisson's ratio, expected both");
   if (m.law)
     check_law(*m.law);
+  if (!m.prony.empty() && !m.poisson)
+    throw Error("a Prony series without a Poisson's ratio, expected both");
+  check_prony(m.prony);
 }
 
 void ModelChecker::begin_nodes(std::size_t count) {

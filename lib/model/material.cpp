@@ -34,6 +34,8 @@ void override_materials(std::vector<Material>& materials, const MaterialOverride
       m.poisson = values.poisson;
     if (values.law)
       m.law = values.law;
+    if (values.prony)
+      m.prony = *values.prony;
   }
 }
 

@@ -45,6 +45,7 @@ void require_parts(const MaterialChoice& choice, std::span<const std::int32_t> p
 struct MaterialOverrides {
   std::optional<double> density, young, thickness, damping_ratio, poisson;
   std::optional<HyperelasticLaw> law = {};
+  std::optional<std::vector<PronyTerm>> prony = {};
 };
 void override_materials(std::vector<Material>& materials, const MaterialOverrides& values);
 

@@ -61,13 +61,16 @@ skin         0.00109  56000   2  0.2  0.49
 # An invasive ductal carcinoma of high grade: 42, standard deviation 12 kPa: Samani et al., as above.
 # Density as of the liver.
 tumour       0.00106  42000  10  0.2  0.49
+# Shear modulus of the order of 1 kPa: Small et al., Soft Matter 21, 2025, who name the
+# measurements. It relaxes to a fraction of that.
+brain        0.00104   3000  10  0.2  0.49
 # Of phantoms: Dragon Skin 10, 264 kPa from the droop of a beam, with 1.07 g/cm3: Dubied et al., IEEE
 # Robot Autom Lett 7, 2022.
 silicone     0.00107 264000   5  0.05  0.49
 )";
 
 constexpr const char* form =
-    ", expected name density young thickness damping_ratio [poisson [law]]";
+    ", expected name density young thickness damping_ratio [poisson [law] [prony:G@TAU,...]]";
 
 /// Calls visit(number, line with its end, words) for each line that is not blank or a comment
 /// alone.
@@ -100,7 +103,7 @@ bool bad_in_name(char c) {
 }
 
 Material material_of(const std::vector<std::string_view>& words) {
-  if (words.size() < 5 || words.size() > 7)
+  if (words.size() < 5 || words.size() > 8)
     throw Error(std::to_string(words.size()) + (words.size() == 1 ? " word" : " words") + form);
   Material m;
   m.name = words[0];
@@ -133,8 +136,13 @@ Material material_of(const std::vector<std::string_view>& words) {
       throw Error(quoted(word) + " is no Poisson's ratio, expected 0 to below 0.5");
     m.poisson = value;
   }
-  if (words.size() == 7)
-    m.law = parse_law(words[6]);
+  std::size_t next = 6;
+  if (words.size() > next && !is_prony(words[next]))
+    m.law = parse_law(words[next++]);
+  if (words.size() > next)
+    m.prony = parse_prony(words[next++]);
+  if (words.size() > next)
+    throw Error(quoted(words[next]) + " behind a Prony series, expected the end of the line");
   return m;
 }
 

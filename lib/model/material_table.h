@@ -1,6 +1,6 @@
 #pragma once
 // Materials as a table of text (gewebe_materials(5)): one per line, `name density young thickness
-// damping_ratio [poisson [law]]`, # comments.
+// damping_ratio [poisson [law] [prony]]`, # comments.
 
 #include "model/model.h"
 

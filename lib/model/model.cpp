@@ -319,6 +319,9 @@ std::string model_digest(const Model& model) {
         add_values(m.law->kind);
         digest.add_bytes(m.law->parameter.data(), sizeof m.law->parameter);
       }
+    for (const Material& m : model.materials)
+      for (const PronyTerm& term : m.prony)
+        add_values(term.share, term.time);
   }
   if (const Skin& skin = model.skin; !skin.points.empty()) {
     add_count(skin.points.size());

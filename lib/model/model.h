@@ -28,6 +28,7 @@
 #include "geometry/mesh.h"
 #include "geometry/vec3.h"
 #include "model/hyperelastic_law.h"
+#include "model/prony.h"
 
 #include <array>
 #include <cstddef>
@@ -49,6 +50,7 @@ struct Material {
   /// Of large strains; springs and small strains do not use it. None: the law is left to the user
   /// of the model, see fem/solid_model.h.
   std::optional<HyperelasticLaw> law{};
+  std::vector<PronyTerm> prony{}; ///< none: elastic
 
   bool operator==(const Material&) const = default;
 };

@@ -287,7 +287,9 @@ void make_body_again(World& w, std::size_t object) {
     const std::span<const NodeMotion> motion = motion_of(w.now.objects[part]);
     motions[part].assign(motion.begin(), motion.end());
   }
-  std::ranges::replace(w.now.bodies, before, make_body(w, before->parts, &motions));
+  const std::shared_ptr<Body> next = make_body(w, before->parts, &motions);
+  next->moving->remember(before->moving->memory());
+  std::ranges::replace(w.now.bodies, before, next);
 }
 
 void make_implicit(World& w, std::shared_ptr<Body>& body) {

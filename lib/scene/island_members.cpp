@@ -151,7 +151,8 @@ contact::ContactBody& StaticMember::begin(double /*from*/, double to, const Cont
     at_object(w_, object, [&] {
       strained_ = &strained_of(w_, object);
       strained_->restore(object.strained);
-      body = &strained_->begin_contact(load_, std::move(last));
+      body = &strained_->begin_contact(load_, std::move(last),
+                                       rest_time(w_, object, given_time_.value_or(to)));
     });
     return *body;
   }

@@ -128,6 +128,8 @@ public:
   void end(std::span<const Force> forces, double h, const Context& context) override;
   /// Replaces the load at the end of the step.
   void set_load(Load load) { given_ = std::move(load); }
+  /// Replaces the time at that end, for what relaxes.
+  void set_time(double time) { given_time_ = time; }
   /// Finds contact on a part of the surface: that of the constructor. \param begin  load at the
   /// beginning of the step \param check  called with the contact forces before the step ends
   void take_part(const SurfacePart& part, const Load& begin,
@@ -157,6 +159,7 @@ private:
   Load load_;
   std::optional<Part> part_;
   std::optional<Load> given_;
+  std::optional<double> given_time_;
   std::optional<Way> way_;
   std::unique_ptr<StaticContactBody> body_;
   SolidStatic* strained_ = nullptr;         ///< instead of body_ if the object has a law

@@ -42,6 +42,14 @@ void require_law_served(const Object& object) {
 
 } // namespace
 
+bool relaxes(const Object& object) {
+  return object.method == Method::ffe && object.matter->known && is_viscoelastic(object.model());
+}
+
+RestTime rest_time(const World& w, const Object& object, double end) {
+  return {w.now.clock.changed, end, object.load->changes_until() > w.now.clock.shown};
+}
+
 void need_model(Object& object) {
   if (object.matter->known)
     return;

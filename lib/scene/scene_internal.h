@@ -290,6 +290,7 @@ struct Event {
 struct Clock {
   double time = 0;
   double shown = 0;         // time of the last output of all objects
+  double changed = 0;       // ... or of an event since then
   double sum = 0, lost = 0; // sum of the steps so far, and its rounding error
 };
 

@@ -153,13 +153,14 @@ std::vector<Group> groups_of(World& w, const Pairs& late, Pairs& apart) {
   return groups;
 }
 
-bool changes(const Object& object) {
-  return !object.shown.valid || object.load->changes_until() > object.shown.time;
+bool changes(const World& w, const Object& object) {
+  return !object.shown.valid || object.load->changes_until() > object.shown.time ||
+         (relaxes(object) && w.now.clock.time > object.shown.time);
 }
 
 bool needs_showing(const World& w, const Group& group) {
   return group.moves || std::ranges::any_of(group.parts.statics, [&](std::size_t index) {
-           return changes(w.now.objects[index]);
+           return changes(w, w.now.objects[index]);
          });
 }
 
@@ -331,9 +332,12 @@ private:
     for (std::size_t n = 0; n < legs_.size(); ++n)
       members.instruments[n].set_target(between(legs_[n].from, legs_[n].to, to),
                                         legs_[n].duration * (to - from));
-    for (std::size_t k = 0; k < parts.statics.size(); ++k)
+    for (std::size_t k = 0; k < parts.statics.size(); ++k) {
+      members.statics[k].set_time(w_.now.clock.shown +
+                                  share * (w_.now.clock.time - w_.now.clock.shown));
       members.statics[k].set_load(
           load_between(before_[k], *w_.now.objects[parts.statics[k]].shown.load, shape_[k], share));
+    }
     advance_members(*cache.motion, members);
   }
 
@@ -434,7 +438,7 @@ Pairs show_groups(World& w, const Pairs& late, std::vector<std::uint8_t>& shown,
   // Objects that no instrument is near may move to one.
   std::set<std::size_t> alone;
   for (const auto& [object, k] : apart.tools)
-    if (shown[object] == 0 && changes(w.now.objects[object]))
+    if (shown[object] == 0 && changes(w, w.now.objects[object]))
       alone.insert(object);
   if (alone.empty() &&
       std::ranges::none_of(groups, [&](const Group& group) { return needs_showing(w, group); }))

@@ -177,7 +177,7 @@ void update_stages(World& w, Object& object, const Load& load) {
   if (has_law(object)) {
     SolidStatic& strained = strained_of(w, object);
     strained.restore(object.strained); // whatever was sought since
-    strained.update(load);
+    strained.update(load, rest_time(w, object, w.now.clock.time));
     object.strained = strained.answer();
     return;
   }

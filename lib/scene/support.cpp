@@ -2,6 +2,7 @@
 
 #include "scene/support.h"
 
+#include "dynamics/solid_law.h"
 #include "scene/world_internal.h"
 
 #include <string>
@@ -44,6 +45,8 @@ bool goes(const Object& object, Way way) {
     return object.warp;
   case Way::strained:
     return !moves && has_law(object);
+  case Way::viscoelastic:
+    return object.matter->known && is_viscoelastic(object.model());
   case Way::filled:
     return object.matter->solid.bulk.has_value();
   }

@@ -24,13 +24,14 @@ enum class Way : std::uint8_t {
   solid_motion, ///< an elastodynamic solid
   warped,       ///< with large rotations
   strained,     ///< elastostatic, with large strains
-  filled        ///< a net that keeps the volume it encloses
+  filled,       ///< a net that keeps the volume it encloses
+  viscoelastic  ///< a solid that relaxes
 };
 inline constexpr std::array all_ways{
     Way::explicit_motion, Way::implicit_motion, Way::attached, Way::elastostatic,
     Way::two_step,        Way::two_step_stored, Way::whole,    Way::cut,
     Way::solid,           Way::sprung,          Way::net,      Way::solid_motion,
-    Way::warped,          Way::strained,        Way::filled};
+    Way::warped,          Way::strained,        Way::filled,   Way::viscoelastic};
 
 /// Feature: an action on an object.
 enum class Feature : std::uint8_t {
@@ -85,6 +86,15 @@ inline constexpr std::array gaps{
         "keeps the volume it encloses (bulk=), expected none to attach"},
     Gap{Way::filled, Feature::method, true,
         "keeps the volume it encloses (bulk=) as long as it moves, expected none for method"},
+    Gap{Way::viscoelastic, Feature::cut, true,
+        "is viscoelastic (prony:), expected an elastic one to cut"},
+    Gap{Way::viscoelastic, Feature::blade, false, "is viscoelastic (prony:): it is not cut"},
+    Gap{Way::viscoelastic, Feature::tear, true,
+        "is viscoelastic (prony:), expected an elastic one to tear"},
+    Gap{Way::viscoelastic, Feature::attach, true,
+        "is viscoelastic (prony:), expected an elastic one to attach"},
+    Gap{Way::viscoelastic, Feature::method, true,
+        "is viscoelastic (prony:) and would forget, expected an elastic one for method"},
     Gap{Way::elastostatic, Feature::attach, true,
         "is elastostatic (ffe) and has no motion to tie, expected ela objects"},
     Gap{Way::explicit_motion, Feature::two_step, true,

@@ -63,8 +63,8 @@ void require_bounded_instruments(const World& w) {
   }
 }
 
-bool needs_showing(const Object& object) {
-  return !object.shown.valid ||
+bool needs_showing(const World& w, const Object& object) {
+  return !object.shown.valid || (relaxes(object) && w.now.clock.time > object.shown.time) ||
          (object.method == Method::ffe && object.load->changes_until() > object.shown.time);
 }
 
@@ -95,10 +95,22 @@ void show_all(World& w) {
       need_model(object);
     if (object.in_motion)
       at_object(w, object, [&] { show_in_motion(w, object); });
-    else if (in_contact[number] == 0 && needs_showing(object))
+    else if (in_contact[number] == 0 && needs_showing(w, object))
       at_object(w, object, [&] { show(w, object); });
     find_shapes(w, object);
   }
+}
+
+/// Viscoelastic solids at rest come to the time of an event under what acted before.
+void relax_until_event(World& w) {
+  for (Object& object : w.now.objects) {
+    if (object.method != Method::ffe || object.in_motion || object.load->empty())
+      continue;
+    need_model(object);
+    if (relaxes(object) && object.touching.empty() && !is_held_altogether(object))
+      at_object(w, object, [&] { update_solver(w, object, acting_at(object, w.now.clock.time)); });
+  }
+  w.now.clock.changed = w.now.clock.time;
 }
 
 } // namespace
@@ -108,6 +120,7 @@ void advance(World& w, double to) {
   begin_contact(w);
   Clock& clock = w.now.clock;
   const double start = clock.time;
+  clock.changed = start;
   const double slack = same_time * (to - start);
   const auto move_to = [&](double time) {
     advance_bodies(w, time);
@@ -115,6 +128,7 @@ void advance(World& w, double to) {
   };
   while (!w.now.events->empty() && w.now.events->begin()->first <= to + slack) {
     move_to(std::min(w.now.events->begin()->first, to));
+    relax_until_event(w);
     take_effect_first(w);
   }
   move_to(to);

@@ -2,7 +2,7 @@
 
 #include "geometry/vector_at.h"
 #include "linalg/condition.h"
-#include "scene/world_internal.h"
+#include "scene/island_members_internal.h"
 
 #include <optional>
 #include <span>

@@ -78,6 +78,11 @@ inline bool has_law(const Object& object) {
   return law_of(object).has_value();
 }
 
+/// Whether it is a viscoelastic solid at rest, whose shape depends on time.
+bool relaxes(const Object& object);
+/// The time that passes until its shape at `end`. \pre relaxes(object)
+RestTime rest_time(const World& w, const Object& object, double end);
+
 /// Marks the output state and the body of an object as out of date.
 inline void touch(Object& object) {
   object.shown.valid = false;

@@ -92,6 +92,7 @@ Section sliding();
 Section passivity();
 Section hand();
 Section peers();
+Section strained_peers();
 Section silicone();
 Section swings();
 Section organs();

@@ -20,7 +20,7 @@
 
 int main(int count, char** words) {
   using namespace gewebe::validate;
-  const std::array<std::pair<std::string, Section (*)()>, 13> all{
+  const std::array<std::pair<std::string, Section (*)()>, 14> all{
       {{"patch", constant_strain},
        {"order", manufactured},
        {"benchmarks", benchmarks},
@@ -31,6 +31,7 @@ int main(int count, char** words) {
        {"passivity", passivity},
        {"hand", hand},
        {"peers", peers},
+       {"strains", strained_peers},
        {"beam", silicone},
        {"swing", swings},
        {"organs", organs}}};

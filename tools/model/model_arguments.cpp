@@ -81,6 +81,9 @@ void declare(cli::Program& p, ModelArguments& a) {
   p.option("--law", a.law, "LAW",
            "law of large strains of tetrahedra, instead of the material's, such as yeoh:c20=0.1")
       .such_as({"neo-hookean", "classical-neo-hookean", "mooney-rivlin:", "yeoh:", "ogden:"});
+  p.option("--prony", a.prony, "TERMS",
+           "viscoelastic tetrahedra: G@TAU,G@TAU,... shares of the stress and their times in s, or "
+           "none, instead of the material's");
   p.option("--order", a.order, "N", "elements: 1 linear, 2 quadratic").range(1, 2);
   p.option("--thickness", a.values.thickness, "H",
            "thickness of a net in mm, instead of the material's")
@@ -138,6 +141,10 @@ void complete(ModelArguments& a) {
   parsed("--name", [&] { check_name(a.name); });
   if (!a.law.empty())
     a.values.law = parsed("--law", [&] { return parse_law(a.law); });
+  if (a.prony == "none")
+    a.values.prony.emplace();
+  else if (!a.prony.empty())
+    a.values.prony = parsed("--prony", [&] { return parse_prony("prony:" + a.prony); });
   refuse(a.list_materials && (a.mesh != "-" || a.matrix || a.fix != "none" || !a.fit.empty()),
          "--list-materials makes no model, expected no mesh and no nodes");
   if (a.materials.empty())

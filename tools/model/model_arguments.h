@@ -19,7 +19,7 @@ namespace gewebe {
 struct ModelArguments {
   std::string mesh = "-", unit, weld = "auto", material = "generic", name, fix = "none",
               axes = "xyz", primitive, size, repair, materials, fit, rule = "parity",
-              on_open = "error", space, transform, law, refine;
+              on_open = "error", space, transform, law, prony, refine;
   MaterialOverrides values;
   BuildOptions build;
   RepairOptions repairs;

@@ -1,6 +1,7 @@
 #include "tools/model/model_fit.h"
 
 #include "base/error.h"
+#include "dynamics/solid_law.h"
 #include "fem/solid_model.h"
 #include "fit/swing_fit.h"
 #include "fit/young_fit.h"
@@ -129,6 +130,9 @@ void fit_damping(Run& run, const Measurements& measured, Stats& stats) {
 void fit_model(Run& run, Model& model, const std::string& file) {
   if (model.tetrahedra.empty() || !model.springs.empty())
     throw Error("--fit: the model has springs, expected one of tetrahedra alone");
+  if (is_viscoelastic(model))
+    throw Error("--fit: the model is viscoelastic, and measurements have no time, expected --prony "
+                "none");
   Input input(file, false);
   const Measurements measured = parse_measurements(input.read_all(), input.name());
   at(input.name(), [&] {

@@ -32,9 +32,9 @@ Model model_source(Run& run, ModelArguments a, Space& space) {
       a.transform.empty() ? std::nullopt : std::optional(transform_from_text(a.transform));
   space = space_from_name(a.space);
   constexpr const char* for_solids =
-      "the input is a surface, expected --solid beside --poisson, --law and --order";
+      "the input is a surface, expected --solid beside --poisson, --law, --prony and --order";
   if (a.matrix) {
-    refuse(!a.solid && a.values.law, for_solids);
+    refuse(!a.solid && (a.values.law || a.values.prony), for_solids);
     number_parts(a.build.material, {});
     require_parts(a.build.material, {});
     const double nodes = static_cast<double>(a.matrix->m) * a.matrix->n;
@@ -72,7 +72,8 @@ Model model_source(Run& run, ModelArguments a, Space& space) {
     at(input.name(), [&] { number_parts(a.build.material, {}); });
     return solid_source(run, input, from, a);
   }
-  refuse(!a.solid && (a.values.poisson || a.values.law || a.order != 2), for_solids);
+  refuse(!a.solid && (a.values.poisson || a.values.law || a.values.prony || a.order != 2),
+         for_solids);
   const MeshReadOptions options{.kind = from,
                                 .unit = a.unit,
                                 .weld = weld_from_name(a.weld),

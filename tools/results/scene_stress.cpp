@@ -1,6 +1,7 @@
 #include "tools/results/scene_stress.h"
 
 #include "base/error.h"
+#include "dynamics/solid_law.h"
 #include "fem/solid_model.h"
 
 #include <algorithm>
@@ -22,6 +23,10 @@ const std::vector<std::uint32_t>& SceneStress::ask(const Simulation& simulation,
     throw Error("object " + command.object +
                 " has a second stage, so that its stress is that of no one material, expected no "
                 "two-step");
+  if (is_viscoelastic(model))
+    throw Error("object " + command.object +
+                " is viscoelastic (prony:), whose stress is not that of its strains alone, "
+                "expected an elastic one");
   Solid solid;
   if (command.nodes) {
     solid.nodes = select_nodes(model, *command.nodes, lists);
