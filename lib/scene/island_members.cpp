@@ -107,7 +107,7 @@ std::vector<double> stood_shape(World& w, Object& object) {
   return {shape.begin(), shape.end()};
 }
 
-void StaticMember::take_part(const SurfacePart& part, const Load& begin,
+void StaticMember::take_part(const SurfacePatch& part, const Load& begin,
                              std::function<void(std::span<const NodalContactForce>)> check) {
   part_ = Part{&part, &begin, std::move(check), {}};
 }
@@ -163,7 +163,7 @@ contact::ContactBody& StaticMember::begin(double /*from*/, double to, const Cont
     std::vector<NodeVector> forces;
     for (const auto& [node, force] : begin.force)
       forces.push_back({node, force});
-    const SurfacePart& part = *part_->part;
+    const SurfacePatch& part = *part_->part;
     part_->stood = solver_of(w_, object).displacement_of_clusters(part.clusters, forces);
     body_ = std::make_unique<ElastostaticContactBody>(
         StaticContactState{&object.model(), &surface_, &load_, part_->stood, part.place,

@@ -67,7 +67,7 @@ Vec3 contact_displacement(const Object& object, std::uint32_t node);
 struct PartIsland {
   std::shared_ptr<const ContactReach> reach;
   std::vector<std::uint32_t> tiles;
-  SurfacePart part;
+  SurfacePatch part;
   std::unique_ptr<contact::IslandMotion> motion;
 };
 
@@ -132,7 +132,7 @@ public:
   void set_time(double time) { given_time_ = time; }
   /// Finds contact on a part of the surface: that of the constructor. \param begin  load at the
   /// beginning of the step \param check  called with the contact forces before the step ends
-  void take_part(const SurfacePart& part, const Load& begin,
+  void take_part(const SurfacePatch& part, const Load& begin,
                  std::function<void(std::span<const NodalContactForce>)> check);
   /// Interpolates the load between `start` and `end`, from that of the output state to that at
   /// `end`, unless it pulses. A jump of the load between steps of the scene then moves other
@@ -151,7 +151,7 @@ private:
   const std::vector<std::uint32_t>& instrument_of_piece_;
   void end_part();
   struct Part {
-    const SurfacePart* part = nullptr;
+    const SurfacePatch* part = nullptr;
     const Load* begin = nullptr;
     std::function<void(std::span<const NodalContactForce>)> check;
     std::vector<double> stood; ///< displacement of its clusters

@@ -111,8 +111,8 @@ Box3 SurfaceTiles::box(std::span<const double> bounds) const {
   return all;
 }
 
-SurfacePart SurfaceTiles::part(std::span<const std::uint32_t> tiles) const {
-  SurfacePart part;
+SurfacePatch SurfaceTiles::part(std::span<const std::uint32_t> tiles) const {
+  SurfacePatch part;
   const contact::BodySurface& whole = surface_.surface;
   std::vector<std::uint32_t> triangles, vertices;
   for (const std::uint32_t k : tiles)

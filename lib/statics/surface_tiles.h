@@ -15,7 +15,7 @@
 namespace gewebe {
 
 /// Part of a surface, with what its displacement is found from.
-struct SurfacePart {
+struct SurfacePatch {
   contact::ModelSurface surface;
   std::vector<std::uint32_t> clusters; ///< of its nodes, ascending
   std::vector<std::uint32_t> node;     ///< of the clusters, one behind the other
@@ -37,7 +37,7 @@ public:
   /// Box that holds the surface.
   Box3 box(std::span<const double> bounds) const;
   /// \param tiles  ascending
-  SurfacePart part(std::span<const std::uint32_t> tiles) const;
+  SurfacePatch part(std::span<const std::uint32_t> tiles) const;
 
 private:
   struct Tile {
