@@ -342,9 +342,9 @@ struct SolidStatic::State {
       const double least = std::max(gradual_step * shortest, duration / most_gradual),
                    count = std::ceil(duration / std::min(least, gradual_part * duration));
       std::vector<double> places = stood;
-      for (double k = 0; k < count; ++k) {
-        relax(part_of_way(model, from, load, stood, k + 1 < count ? (k + 1) / count : 1), places,
-              duration / count, span.start + duration * (k + 1) / count);
+      for (int k = 1; k <= static_cast<int>(count); ++k) {
+        relax(part_of_way(model, from, load, stood, k < count ? k / count : 1), places,
+              duration / count, span.start + duration * k / count);
         places.assign(engine.places().begin(), engine.places().end());
       }
       set(load, false, span.end, span.end);

@@ -15,6 +15,7 @@
 #include "tet_fixtures.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdint>
 #include <gtest/gtest.h>
@@ -137,6 +138,21 @@ TEST(ContactParts, TilesThatMayMeetABoxAreFound) {
   EXPECT_LT(*std::ranges::min_element(sizes), surface.node.size() / 4);
 }
 
+/// A bar in a scene. \param whole  it may touch another object, which is far away: then contact is
+/// looked for all over its surface
+void add_bar(Simulation& s, bool whole) {
+  s.add_object("bar", long_bar().model, Method::ffe, long_bar().source());
+  if (!whole)
+    return;
+  Model far = solid_model(test::box_tetrahedra(1, 1, 1, 5), {}, {});
+  for (Node& node : far.nodes) {
+    node.position.x += 1000;
+    node.fixed = fixed_all;
+  }
+  s.add_object("far", far, Method::ffe);
+  s.apply(SetContact{0, 1, 0});
+}
+
 SetInstrument tool(std::size_t number, double radius, const Vec3& at, double friction,
                    const Vec3& axis = {}) {
   SetInstrument set;
@@ -160,9 +176,7 @@ struct Told {
 /// \param read  shapes are read in each step
 Told rolled(bool whole, bool read) {
   Simulation s(test::one_thread(), {});
-  s.add_object("bar", long_bar().model, Method::ffe, long_bar().source());
-  if (whole)
-    s.apply(SetContact{0, 0, 0});
+  add_bar(s, whole);
   s.apply(SetForce{0, {0, 7}, {10, 20, 5}});
   s.apply(tool(0, 6, {60, 5, 17}, 0.3));
   s.apply(tool(1, 3, {80, -5, -4}, 0, {0, 20, 0}));
@@ -205,6 +219,48 @@ TEST(ContactParts, ForcesAreThoseOfTheWholeSurface) {
   EXPECT_LT(part.shapes_made, whole.shapes_made / 4) << "shapes that nobody reads cost nothing";
 }
 
+// Three tools, one of them held by a spring, anywhere around the bar; one comes and goes.
+TEST(ContactParts, WhereverToolsGoForcesAreThoseOfTheWholeSurface) {
+  const auto forces = [](bool whole) {
+    Simulation s(test::one_thread(), {});
+    add_bar(s, whole);
+    s.apply(tool(0, 6, {60, 5, 17}, 0));
+    s.apply(tool(1, 3, {80, -5, -4}, 0, {0, 20, 0}));
+    s.apply(tool(2, 4, {110, 16, 5}, 0));
+    s.apply(SetCoupling{0, Coupling{4000, 0}});
+    s.step(0.01);
+    std::mt19937 random(8);
+    std::uniform_real_distribution<double> any(-1, 1);
+    std::vector<Vec3> all;
+    for (int k = 0; k < 20; ++k) {
+      const double x = 70 + 40 * any(random);
+      s.apply(MoveInstrument{0, {x, 5 + any(random), 14.5 + any(random)}, {}, 0.01});
+      s.apply(MoveInstrument{1, {80 + 6 * any(random), -5, -3 + any(random)}, {}, 0.01});
+      if (k % 10 == 6)
+        s.apply(Withdraw{2});
+      else if (k % 10 == 8)
+        s.apply(tool(2, 4, {110 + 5 * any(random), 16, 5}, 0));
+      else if (k % 10 != 7)
+        s.apply(MoveInstrument{2, {110 + 5 * any(random), 14 + any(random), 5}, {}, 0.01});
+      s.step(0.01);
+      for (const std::size_t number : {0U, 1U, 2U})
+        all.push_back(s.instrument(number).force);
+    }
+    return all;
+  };
+  const std::vector<Vec3> part = forces(false), whole = forces(true);
+  double most = 0;
+  std::array<std::size_t, 3> touched{};
+  for (std::size_t k = 0; k < whole.size(); ++k) {
+    most = test::larger(most, norm(whole[k]));
+    touched[k % 3] += norm(whole[k]) > 0 ? 1 : 0;
+  }
+  for (const std::size_t count : touched)
+    EXPECT_GT(count, 2);
+  for (std::size_t k = 0; k < whole.size(); ++k)
+    EXPECT_LE(norm(part[k] - whole[k]), 5e-4 * most) << k;
+}
+
 // Answers are the same bytes whether shapes are read or not.
 TEST(ContactParts, ForcesDoNotDependOnWhatIsRead) {
   const Told one = rolled(false, false), other = rolled(false, true);
@@ -217,9 +273,7 @@ TEST(ContactParts, ForcesDoNotDependOnWhatIsRead) {
 TEST(ContactParts, WhatOnlyTheEndOfAStepReachesIsInContact) {
   const auto forces = [&](bool whole) {
     Simulation s(test::one_thread(), {});
-    s.add_object("bar", long_bar().model, Method::ffe, long_bar().source());
-    if (whole)
-      s.apply(SetContact{0, 0, 0});
+    add_bar(s, whole);
     s.apply(tool(0, 30, {115, 5, 41}, 0)); // so large that it goes all of its way at once
     s.apply(tool(1, 3, {70, -5, -5}, 0, {0, 20, 0}));
     s.step(0.01);

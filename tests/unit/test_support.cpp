@@ -24,7 +24,7 @@ namespace {
 
 bool is_solid(Way way) {
   return way == Way::solid || way == Way::warped || way == Way::strained ||
-         way == Way::solid_motion || way == Way::sprung;
+         way == Way::solid_motion || way == Way::sprung || way == Way::viscoelastic;
 }
 
 /// All that an object is which goes on this way, in these tests, but for what it consists of.
@@ -48,6 +48,8 @@ std::vector<Way> ways_of(Way way) {
     return {Way::elastostatic, Way::whole, Way::warped};
   case Way::strained:
     return {Way::elastostatic, Way::whole, Way::strained};
+  case Way::viscoelastic:
+    return {Way::elastostatic, Way::whole, Way::strained, Way::viscoelastic};
   case Way::net:
     return {Way::elastostatic, Way::whole};
   case Way::filled:
@@ -105,6 +107,8 @@ Model model_of(Way way) {
     const auto [i, j] = std::minmax(model.triangles[0][0], model.triangles[0][1]);
     model.springs = {{i, j, SpringKind::edge, 1, 0, 1}};
   }
+  if (way == Way::viscoelastic)
+    model.materials[0].prony = {{0.3, 0.01}};
   return model;
 }
 
@@ -121,7 +125,7 @@ public:
     SolidChoice choice;
     if (way == Way::filled)
       choice.bulk = 1000;
-    if (way == Way::strained)
+    if (way == Way::strained || way == Way::viscoelastic)
       choice.law = SolidLaw::hyperelastic;
     scene_.add_object("o", model_, moves ? Method::ela : Method::ffe, {}, integration, choice);
     Model beside = test::organ(3);
