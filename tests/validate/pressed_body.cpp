@@ -27,7 +27,7 @@ bool PressedBody::move(const Pose& to, int halvings) {
 }
 
 bool PressedBody::step(const Pose& to) {
-  ElastostaticContactBody body({&model_, &body_, &load_, displacement_, last_},
+  ElastostaticContactBody body({&model_, &body_, &load_, displacement_, {}, last_},
                                [this]() -> Elastostatic& { return solver_; });
   contact::InstrumentBody tool(tool_.rest, pose_, to, 0, {});
   island_.table.bodies = {&body, &tool};
