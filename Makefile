@@ -263,6 +263,8 @@ $(BUILD)/unit: $(call obj,$(UNIT_SRC)) $(SHARED) $(ARCHIVE) | $(PLUGIN)
 $(STRESS): $(BUILD)/stress_%: $(BUILD)/obj/tests/stress/%.o $(call obj,tests/unit/mesh_fixtures.cpp) $(SHARED) $(ARCHIVE)
 	$(LINK) $(LIBS)
 
+# Its second object comes behind the archive, which is read again.
+$(BUILD)/bench_contact_error: LIBS := $(ARCHIVE) $(LIBS)
 $(BUILD)/bench_contact_error: $(call obj,tests/validate/pressed_body.cpp)
 $(BENCH): $(BUILD)/bench_%: $(BUILD)/obj/tests/bench/%.o $(call obj,tests/unit/mesh_fixtures.cpp) $(SHARED) $(ARCHIVE)
 	$(LINK) $(LIBS) $(BENCH_LIBS)
