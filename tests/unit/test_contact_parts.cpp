@@ -216,7 +216,7 @@ TEST(ContactParts, ForcesAreThoseOfTheWholeSurface) {
   const std::vector<double>&a = part.shapes.back(), &b = whole.shapes.back();
   for (std::size_t k = 0; k < a.size(); ++k)
     EXPECT_NEAR(a[k], b[k], 1e-3 * largest_size(b));
-  EXPECT_LT(part.shapes_made, whole.shapes_made / 4) << "shapes that nobody reads cost nothing";
+  EXPECT_LT(part.shapes_made, whole.shapes_made / 4) << "shapes that are not read cost nothing";
 }
 
 // Three tools, one of them held by a spring, anywhere around the bar; one comes and goes.
