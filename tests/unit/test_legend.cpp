@@ -1,4 +1,4 @@
-#include "tools/render/legend.h"
+#include "tools/plot/legend.h"
 
 #include "tests/unit/larger.h"
 #include "texture/lettering.h"

@@ -4,7 +4,7 @@
 #include "formats/stream/stream.h"
 #include "shading/camera.h"
 #include "tools/cli/cli.h"
-#include "tools/render/legend.h"
+#include "tools/plot/legend.h"
 #include "tools/render/render_arguments.h"
 
 #include <cstdint>

@@ -1,4 +1,4 @@
-#include "tools/render/legend.h"
+#include "tools/plot/legend.h"
 
 #include "formats/curves/curve_sheet.h"
 #include "text/number_text.h"
