@@ -2,6 +2,7 @@
 // Curves y(x) on one sheet, drawn as SVG or as letters.
 
 #include "formats/curves/number_table.h"
+#include "text/round_axis.h"
 
 #include <cstddef>
 #include <span>
@@ -10,14 +11,6 @@
 
 namespace gewebe {
 
-/// Range of an axis, from one round number to another, and the numbers at its marks.
-struct CurveAxis {
-  double min = 0, max = 1;
-  std::vector<double> marks;      ///< ascending, at least two
-  std::vector<std::string> texts; ///< of the marks, all with the same number of decimals
-  std::string title;              ///< with unit
-};
-
 struct Curve {
   std::string name;
   std::vector<double> x, y; ///< of equal length; NaN: a gap
@@ -25,13 +18,9 @@ struct Curve {
 
 struct CurveSheet {
   std::string title;
-  CurveAxis x, y;
+  RoundAxis x, y;
   std::vector<Curve> curves;
 };
-
-/// Round numbers (1, 2 or 5 times a power of ten apart) that enclose min and max, about `count`.
-/// \pre finite, min <= max
-CurveAxis round_axis(double min, double max, std::size_t count);
 
 /// Columns against one column. Large numbers get a larger unit: 23000 uN is 23 mN.
 /// \throw UsageError if a column holds words, or the units of `ys` differ

@@ -23,7 +23,7 @@ struct Letters {
 };
 
 /// Cell of a value on an axis of so many cells.
-std::size_t cell_of(const CurveAxis& axis, double value, std::size_t cells) {
+std::size_t cell_of(const RoundAxis& axis, double value, std::size_t cells) {
   return static_cast<std::size_t>(
       std::lround((value - axis.min) / (axis.max - axis.min) * static_cast<double>(cells - 1)));
 }

@@ -74,10 +74,10 @@ std::string stroke_of(std::size_t k) {
 struct Frame {
   double left = 0, right = 0, top = 0, bottom = 0;
 
-  double x(const CurveAxis& axis, double v) const {
+  double x(const RoundAxis& axis, double v) const {
     return left + (right - left) * ((v - axis.min) / (axis.max - axis.min));
   }
-  double y(const CurveAxis& axis, double v) const {
+  double y(const RoundAxis& axis, double v) const {
     return bottom - (bottom - top) * ((v - axis.min) / (axis.max - axis.min));
   }
 };

@@ -75,7 +75,7 @@ TEST(Curves, WrongTablesAndNamesAreNamed) {
 }
 
 TEST(Curves, AxesEndAtRoundNumbersThatEncloseAll) {
-  const CurveAxis a = round_axis(0, 6.48, 6);
+  const RoundAxis a = round_axis(0, 6.48, 6);
   EXPECT_EQ(a.texts, (std::vector<std::string>{"0", "2", "4", "6", "8"}));
   EXPECT_EQ(round_axis(-0.13, 0.1, 5).texts,
             (std::vector<std::string>{"-0.15", "-0.10", "-0.05", "0.00", "0.05", "0.10"}));
@@ -83,7 +83,7 @@ TEST(Curves, AxesEndAtRoundNumbersThatEncloseAll) {
   for (double size = 1e-290; size < 1e290; size *= 37)
     for (const auto& [min, max] :
          {std::pair{-size, 2 * size}, {0.0, size}, {size, size}, {0.997 * size, size}}) {
-      const CurveAxis axis = round_axis(min, max, 5);
+      const RoundAxis axis = round_axis(min, max, 5);
       EXPECT_LE(axis.min, min + 1e-8 * size) << size;
       EXPECT_GE(axis.max, max - 1e-8 * size) << size;
       EXPECT_GE(axis.marks.size(), 2U) << size;

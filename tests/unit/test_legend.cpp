@@ -1,6 +1,7 @@
-#include "tools/plot/legend.h"
+#include "texture/legend.h"
 
 #include "tests/unit/larger.h"
+#include "text/round_axis.h"
 #include "texture/lettering.h"
 
 #include <algorithm>
@@ -79,19 +80,19 @@ TEST(Legend, WhatLiesBeyondThePictureIsLeftOut) {
 }
 
 TEST(Legend, LengthsAreRound) {
-  EXPECT_EQ(cli::round_length(49), 20);
-  EXPECT_EQ(cli::round_length(50), 50);
-  EXPECT_EQ(cli::round_length(0.07), 0.05);
-  EXPECT_EQ(cli::round_length(1), 1);
-  EXPECT_EQ(cli::round_length(0), 0);
-  EXPECT_EQ(cli::round_length(std::nan("")), 0);
-  EXPECT_EQ(cli::round_length(HUGE_VAL), 0);
+  EXPECT_EQ(round_length(49), 20);
+  EXPECT_EQ(round_length(50), 50);
+  EXPECT_EQ(round_length(0.07), 0.05);
+  EXPECT_EQ(round_length(1), 1);
+  EXPECT_EQ(round_length(0), 0);
+  EXPECT_EQ(round_length(std::nan("")), 0);
+  EXPECT_EQ(round_length(HUGE_VAL), 0);
 }
 
 TEST(Legend, BarAndScaleShowWhatTheySay) {
   Image image = gray(420, 420);
-  cli::Legend legend;
-  legend.bar = cli::LegendBar{"u [mm]", {0, 4}, color_ramp_from_name("viridis")};
+  Legend legend;
+  legend.bar = LegendBar{"u [mm]", {0, 4}, color_ramp_from_name("viridis")};
   legend.mm_per_pixel = 0.5; // 20 mm on 40 pixels
   legend.time = 0.25;
   draw_legend(image, legend, {0.5, 0.5, 0.5});

@@ -3,8 +3,8 @@
 
 #include "formats/stream/stream.h"
 #include "shading/camera.h"
+#include "texture/legend.h"
 #include "tools/cli/cli.h"
-#include "tools/plot/legend.h"
 #include "tools/render/render_arguments.h"
 
 #include <cstdint>

@@ -1,13 +1,13 @@
-#include "tools/plot/legend.h"
+#include "texture/legend.h"
 
-#include "formats/curves/curve_sheet.h"
 #include "text/number_text.h"
+#include "text/round_axis.h"
 #include "texture/lettering.h"
 
 #include <algorithm>
 #include <cmath>
 
-namespace gewebe::cli {
+namespace gewebe {
 namespace {
 
 /// Sizes in px, from the picture's.
@@ -48,7 +48,7 @@ void draw_bar(Image& picture, const Layout& at, const LegendBar& bar) {
       color[c] = static_cast<std::uint8_t>(std::floor(mixed[c] + 0.5));
     fill_rectangle(picture, {left, top + row}, {right, top + row + 1}, color);
   }
-  const CurveAxis axis = round_axis(bar.range[0], bar.range[1], 5);
+  const RoundAxis axis = round_axis(bar.range[0], bar.range[1], 5);
   const double span = bar.range[1] - bar.range[0];
   for (std::size_t k = 0; k < axis.marks.size(); ++k) {
     const double share = (axis.marks[k] - bar.range[0]) / span;
@@ -78,19 +78,6 @@ void draw_scale(Image& picture, const Layout& at, double mm_per_pixel) {
 
 } // namespace
 
-double round_length(double most) {
-  if (!(most > 0 && most <= 1e300))
-    return 0;
-  double power = 1;
-  while (power > most && power > 1e-300)
-    power /= 10;
-  while (power * 10 <= most)
-    power *= 10;
-  const double factor = most >= 5 * power ? 5 : most >= 2 * power ? 2 : 1;
-  // 5e-2 instead of 0.05000000000000001
-  return std::stod(six_digits(factor * power));
-}
-
 void draw_legend(Image& picture, const Legend& legend, const Vec3& background) {
   const Layout layout = layout_of(picture, background);
   if (legend.bar)
@@ -102,4 +89,4 @@ void draw_legend(Image& picture, const Legend& legend, const Vec3& background) {
                    six_digits(*legend.time) + " s", layout.style);
 }
 
-} // namespace gewebe::cli
+} // namespace gewebe

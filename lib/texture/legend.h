@@ -10,7 +10,7 @@
 #include <optional>
 #include <string>
 
-namespace gewebe::cli {
+namespace gewebe {
 
 /// Pictures whose shorter side has fewer pixels have no room for a legend.
 constexpr std::uint32_t least_legend_side = 200;
@@ -29,11 +29,8 @@ struct Legend {
   bool empty() const { return !bar && !mm_per_pixel && !time; }
 };
 
-/// The longest round length (1, 2 or 5 times a power of ten) of up to `most` mm.
-double round_length(double most);
-
 /// Draws bar (right), scale (below, left) and time (above, left), in black or white by the
 /// background (0 … 1). \pre sides from least_legend_side, 3 channels
 void draw_legend(Image& picture, const Legend& legend, const Vec3& background);
 
-} // namespace gewebe::cli
+} // namespace gewebe
