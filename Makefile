@@ -369,8 +369,7 @@ LINT_HEADERS := $(wildcard lib/*/*.h formats/*/*.h tools/*/*.h tests/*/*.h)
 TIDY ?= lib formats tools tests
 TIDY_CXX := $(filter $(TIDY:%=%/%),$(LINT_CXX))
 ifneq ($(COMMITS),)
-TIDY_CXX := $(filter $(patsubst %.h,%.cpp,$(shell git log -n $(COMMITS) --no-merges -M --diff-filter=AM --name-only --format= || \
-  printf '%s\n' $(LINT_CXX))),$(TIDY_CXX))
+TIDY_CXX := $(filter $(patsubst %.h,%.cpp,$(shell scripts/changed-files $(COMMITS) || printf '%s\n' $(LINT_CXX))),$(TIDY_CXX))
 endif
 TIDY_ALONE := $(filter $(SINGLE) lib/volume/% formats/volume/% $(filter-out tools/run/%,$(wildcard tools/*/*.cpp)) $(wildcard tools/*.cpp) \
   $(patsubst %,tests/%/%,bench fuzz stress validate),$(TIDY_CXX))

@@ -14,18 +14,18 @@ namespace {
 struct Arguments {
   std::string word;
   std::vector<std::string> volumes;
-  CsgOperation operation = CsgOperation::add;
-  CsgOptions options;
-  VolumeOutput output;
+  volume::CsgOperation operation = volume::CsgOperation::add;
+  volume::CsgOptions options;
+  cli::VolumeOutput output;
 };
 
 void complete(Arguments& a) {
-  a.operation = csg_operation_from_name(a.word);
+  a.operation = volume::csg_operation_from_name(a.word);
   cli::check_one_pipe(a.volumes);
 }
 
 /// The box of what is not background, in mm; empty if there is nothing.
-Box3 world_box(const Grid& grid) {
+Box3 world_box(const volume::Grid& grid) {
   Box3 box;
   Int3 low{}, high{};
   if (grid.active_box(low, high))
@@ -40,9 +40,9 @@ Box3 world_box(const Grid& grid) {
 }
 
 /// A volume that lies apart from all before it changes nothing of them, or leaves nothing.
-void warn_of_apart(cli::Run& run, const std::vector<CsgOperand>& operands) {
+void warn_of_apart(cli::Run& run, const std::vector<volume::CsgOperand>& operands) {
   Box3 all;
-  for (const CsgOperand& operand : operands) {
+  for (const volume::CsgOperand& operand : operands) {
     const Box3 box = world_box(operand.grid);
     if (!box.empty() && !all.empty())
       for (int axis = 0; axis < 3; ++axis)
@@ -59,17 +59,17 @@ void warn_of_apart(cli::Run& run, const std::vector<CsgOperand>& operands) {
 }
 
 void work(cli::Run& run, const Arguments& a) {
-  Output output = open_volume(run);
-  std::vector<CsgOperand> operands;
-  VolumeOutput result = a.output;
+  formats::Output output = cli::open_volume(run);
+  std::vector<volume::CsgOperand> operands;
+  cli::VolumeOutput result = a.output;
   bool spaces_match = true;
   run.timed("read", [&] {
     std::string stated;
     for (const std::string& path : a.volumes) {
-      Input input(path);
+      formats::Input input(path);
       Space space = Space::unknown;
-      operands.push_back({read_volume(input, run.context(), &space), input.name()});
-      warn_of_spaces(run, stated, result.space, input.name(), space);
+      operands.push_back({formats::read_volume(input, run.context(), &space), input.name()});
+      cli::warn_of_spaces(run, stated, result.space, input.name(), space);
       spaces_match = spaces_match && !spaces_differ(result.space, space);
       if (result.space == Space::unknown) {
         result.space = space;
@@ -79,10 +79,10 @@ void work(cli::Run& run, const Arguments& a) {
   });
   if (spaces_match)
     warn_of_apart(run, operands);
-  CsgReport counts;
-  const Grid grid = run.timed(
-      "csg", [&] { return csg(run.context(), a.operation, operands, a.options, &counts); });
-  write(run, output, grid, result);
+  volume::CsgReport counts;
+  const volume::Grid grid = run.timed(
+      "csg", [&] { return volume::csg(run.context(), a.operation, operands, a.options, &counts); });
+  cli::write(run, output, grid, result);
 
   cli::Stats& stats = run.stats();
   stats.set("operation", a.word);
@@ -102,9 +102,9 @@ int main(int argc, char** argv) {
   cli::Program p("csg", "Combines volumes: sums, differences and set operations, left to right.");
   Arguments a;
   p.flag("--resample", a.options.resample, "resample other volumes to the lattice of the first");
-  declare(p, a.output);
+  cli::declare(p, a.output);
   p.operand("OPERATION", a.word, "add, subtract, union, intersect, difference, xor", true,
-            csg_operation_names());
+            volume::csg_operation_names());
   p.operands("VOLUME", a.volumes, "volumes, - for standard input", 2);
   p.check([&] { complete(a); });
   return p.run(argc, argv, [&](cli::Run& run) { work(run, a); });

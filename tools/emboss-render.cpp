@@ -24,41 +24,44 @@
 using namespace gewebe;
 namespace {
 
-std::vector<Surface> read(cli::Run& run, Input& input, const SurfaceReadOptions& options,
-                          bool occluded) {
-  SolidReport solid;
-  std::vector<Surface> surfaces = read_surfaces(input, options, run.context(), &solid);
+std::vector<shading::Surface> read(cli::Run& run, formats::Input& input,
+                                   const cli::SurfaceReadOptions& options, bool occluded) {
+  cli::SolidReport solid;
+  std::vector<shading::Surface> surfaces =
+      cli::read_surfaces(input, options, run.context(), &solid);
   tell_solid(run, input.name(), options, solid);
   run.stats().set("surfaces", std::uint64_t{surfaces.size()});
-  run.stats().set("triangles", triangle_count(surfaces));
-  if (triangle_count(surfaces) == 0)
+  run.stats().set("triangles", shading::triangle_count(surfaces));
+  if (shading::triangle_count(surfaces) == 0)
     run.warn(input.name() + ": no triangle to draw");
   at(input.name(), [&] {
     const double hidden =
-        occluded ? occlusion_bytes(static_cast<double>(triangle_count(surfaces))) : 0;
-    require_memory(run.context(), drawing_bytes(surfaces) + hidden, "drawing the triangles");
+        occluded ? shading::occlusion_bytes(static_cast<double>(shading::triangle_count(surfaces)))
+                 : 0;
+    require_memory(run.context(), shading::drawing_bytes(surfaces) + hidden,
+                   "drawing the triangles");
   });
   return surfaces;
 }
 
-bool contains(const std::vector<Kind>& kinds, Kind kind) {
+bool contains(const std::vector<formats::Kind>& kinds, formats::Kind kind) {
   return std::ranges::find(kinds, kind) != kinds.end();
 }
 
 /// Kinds of pictures, films and scenes.
-std::vector<Kind> output_kinds() {
-  std::vector<Kind> kinds = picture_kinds();
-  kinds.insert(kinds.end(), film_kinds().begin(), film_kinds().end());
+std::vector<formats::Kind> output_kinds() {
+  std::vector<formats::Kind> kinds = formats::picture_kinds();
+  kinds.insert(kinds.end(), formats::film_kinds().begin(), formats::film_kinds().end());
   kinds.insert(kinds.end(), cli::scene_kinds().begin(), cli::scene_kinds().end());
   return kinds;
 }
 
 /// The frames to draw: of a result, or one shape from all sides.
-std::vector<std::int64_t> drawn_frames(const cli::RenderArguments& a, const Input& input) {
+std::vector<std::int64_t> drawn_frames(const cli::RenderArguments& a, const formats::Input& input) {
   if (!a.frames.empty()) {
-    if (a.reading.kind != Kind::hdf5)
+    if (a.reading.kind != formats::Kind::hdf5)
       throw UsageError(input.name(), "--frames for no result of a run, expected --frames absent");
-    return result_frames(input, a.frames);
+    return cli::result_frames(input, a.frames);
   }
   std::vector<std::int64_t> frames;
   const std::int64_t count = std::max(a.turn.value_or(1), a.turn_light.value_or(1));
@@ -67,17 +70,17 @@ std::vector<std::int64_t> drawn_frames(const cli::RenderArguments& a, const Inpu
   return frames;
 }
 
-void draw(cli::Run& run, cli::RenderArguments& a, Input& input, cli::PictureSink& sink) {
+void draw(cli::Run& run, cli::RenderArguments& a, formats::Input& input, cli::PictureSink& sink) {
   const std::vector<std::int64_t> frames = drawn_frames(a, input);
-  if (a.reading.kind == Kind::hdf5)
+  if (a.reading.kind == formats::Kind::hdf5)
     take_field(run, a, input,
                a.frames.empty() ? std::vector{a.reading.frame.value_or(-1)} : frames);
   sink.expect(frames.size());
   cli::Pictures pictures(run, a);
   cli::SurfaceLegends legends(a, input);
   Digest digest;
-  Image picture;
-  std::vector<Surface> surfaces;
+  texture::Image picture;
+  std::vector<shading::Surface> surfaces;
   for (const std::int64_t frame : frames) {
     if (!a.frames.empty())
       a.reading.frame = frame;
@@ -96,29 +99,30 @@ void draw(cli::Run& run, cli::RenderArguments& a, Input& input, cli::PictureSink
 }
 
 void work(cli::Run& run, cli::RenderArguments a) {
-  const Kind to = output_kind(run.to(), run.output(), Kind::png, output_kinds());
-  const bool film = contains(film_kinds(), to), scene = contains(cli::scene_kinds(), to);
+  const formats::Kind to =
+      formats::output_kind(run.to(), run.output(), formats::Kind::png, output_kinds());
+  const bool film = contains(formats::film_kinds(), to), scene = contains(cli::scene_kinds(), to);
   if (a.rate && !film)
-    throw UsageError("--fps for " + std::string(kind_name(to)) + ", expected mp4 or webm");
+    throw UsageError("--fps for " + std::string(formats::kind_name(to)) + ", expected mp4 or webm");
   const bool sequence = !a.frames.empty() || a.turn || a.turn_light;
   const bool many = sequence && !film && run.output().find('%') != std::string::npos;
   std::optional<cli::PictureSink> sink;
   if (!scene)
     sink.emplace(run, to, many, a.rate.value_or(25));
-  Input input(a.surface);
-  a.reading.kind = input_kind(input.peek(4096), a.surface, run.format());
+  formats::Input input(a.surface);
+  a.reading.kind = formats::input_kind(input.peek(4096), a.surface, run.format());
   check_kind(a, input, a.reading.kind);
   cli::take_instruments(a, input);
   if (scene)
     return cli::write_scene(run, a, input, to);
-  if (a.reading.kind != Kind::vdb)
+  if (a.reading.kind != formats::Kind::vdb)
     return draw(run, a, input, *sink);
-  const Image picture = cli::volume_picture(run, a, input);
+  const texture::Image picture = cli::volume_picture(run, a, input);
   run.timed("write", [&] {
     sink->put(picture, false, 0);
     sink->commit();
   });
-  run.stats().set("digest", image_digest(picture));
+  run.stats().set("digest", texture::image_digest(picture));
 }
 
 } // namespace
@@ -133,8 +137,8 @@ int main(int argc, char** argv) {
   cli::RenderArguments a;
   declare(p, a);
   p.output_kinds(output_kinds());
-  std::vector<Kind> kinds = readable_surface_kinds();
-  kinds.push_back(Kind::vdb);
+  std::vector<formats::Kind> kinds = cli::readable_surface_kinds();
+  kinds.push_back(formats::Kind::vdb);
   p.input_kinds(kinds);
   p.operand("SURFACE", a.surface, "mesh, tetrahedra, model, result or volume");
   return p.run(argc, argv, [&](cli::Run& run) { work(run, a); });

@@ -24,97 +24,100 @@ using namespace gewebe;
 
 namespace {
 
-std::vector<Kind> and_ela(std::vector<Kind> kinds) {
-  kinds.push_back(Kind::ela);
+std::vector<formats::Kind> and_ela(std::vector<formats::Kind> kinds) {
+  kinds.push_back(formats::Kind::ela);
   return kinds;
 }
 
 /// Meshes, models, and solids for other solvers.
-std::vector<Kind> all_outputs() {
-  std::vector<Kind> kinds = and_ela(writable_mesh_kinds());
-  kinds.insert(kinds.end(), solid_deck_kinds().begin(), solid_deck_kinds().end());
+std::vector<formats::Kind> all_outputs() {
+  std::vector<formats::Kind> kinds = and_ela(formats::writable_mesh_kinds());
+  kinds.insert(kinds.end(), formats::solid_deck_kinds().begin(), formats::solid_deck_kinds().end());
   return kinds;
 }
 
-std::vector<Kind> all_inputs() {
-  std::vector<Kind> kinds = and_ela(readable_mesh_kinds());
-  for (const Kind kind : readable_tet_kinds())
+std::vector<formats::Kind> all_inputs() {
+  std::vector<formats::Kind> kinds = and_ela(formats::readable_mesh_kinds());
+  for (const formats::Kind kind : formats::readable_tet_kinds())
     if (std::ranges::find(kinds, kind) == kinds.end())
       kinds.push_back(kind);
   return kinds;
 }
 
-void fix(Model& model, const ModelArguments& a) {
-  const auto load = [](const std::string& name) { return Input(name, false).read_all(); };
-  for (const auto node : select_nodes(model, *a.fixed, load, SelectorScope::body))
-    model.nodes[node].fixed |= *fixed_axes_from_name(a.axes);
+void fix(model::Model& model, const cli::ModelArguments& a) {
+  const auto load = [](const std::string& name) { return formats::Input(name, false).read_all(); };
+  for (const auto node : model::select_nodes(model, *a.fixed, load, model::SelectorScope::body))
+    model.nodes[node].fixed |= *model::fixed_axes_from_name(a.axes);
 }
 
-void hold_step(cli::Run& run, Model& model, const ModelArguments& a) {
+void hold_step(cli::Run& run, model::Model& model, const cli::ModelArguments& a) {
   if (!a.dt)
     return;
   if (a.scale_mass)
-    run.stats().set("scaled_masses", std::uint64_t{scale_masses(model, *a.dt)});
-  require_safe_step(model, *a.dt);
+    run.stats().set("scaled_masses", std::uint64_t{model::scale_masses(model, *a.dt)});
+  model::require_safe_step(model, *a.dt);
 }
 
-void report_steps(cli::Run& run, const Model& model) {
-  const std::vector<double> steps = safe_steps(model);
+void report_steps(cli::Run& run, const model::Model& model) {
+  const std::vector<double> steps = model::safe_steps(model);
   const auto min = std::min_element(steps.begin(), steps.end());
   run.stats().set("safe_step", *min);
   run.stats().set("safe_step_node", static_cast<std::uint64_t>(min - steps.begin()));
 }
 
-void work(cli::Run& run, ModelArguments& a) {
+void work(cli::Run& run, cli::ModelArguments& a) {
   if (!a.materials.empty())
-    choose_materials(a);
-  const Kind to = output_kind(run.to(), run.output(), Kind::ela, all_outputs());
-  Output output(run.output(), run.output_options(is_binary(to)));
+    cli::choose_materials(a);
+  const formats::Kind to =
+      formats::output_kind(run.to(), run.output(), formats::Kind::ela, all_outputs());
+  formats::Output output(run.output(), run.output_options(formats::is_binary(to)));
   Space space = Space::unknown;
-  Model model = cli::model_source(run, a, space);
+  model::Model model = cli::model_source(run, a, space);
   if (!a.name.empty())
     model.name = a.name;
   if (a.fixed)
     fix(model, a);
   if (!a.fit.empty())
     cli::fit_model(run, model, a.fit);
-  const bool deck = std::ranges::find(solid_deck_kinds(), to) != solid_deck_kinds().end();
-  if (to == Kind::ela || deck) {
+  const bool deck =
+      std::ranges::find(formats::solid_deck_kinds(), to) != formats::solid_deck_kinds().end();
+  if (to == formats::Kind::ela || deck) {
     cli::warn_of_hinges(run, model);
     cli::warn_of_laws(run, model);
   }
   hold_step(run, model, a);
   run.timed("write", [&] {
-    if (to == Kind::ela)
-      write_ela(output, model, run.context(), space);
+    if (to == formats::Kind::ela)
+      formats::write_ela(output, model, run.context(), space);
     else if (deck)
-      write_solid_deck(output, model, to);
+      formats::write_solid_deck(output, model, to);
     else
-      write_mesh(output, surface_mesh(model), to);
+      formats::write_mesh(output, model::surface_mesh(model), to);
   });
   output.commit();
   if (!run.stats_wanted())
     return;
-  for (const auto& [key, count] : model_counts(model, run.context()))
+  for (const auto& [key, count] : model::model_counts(model, run.context()))
     run.stats().set(key, count);
-  run.stats().set("total_mass", total_mass(model));
+  run.stats().set("total_mass", model::total_mass(model));
   if (model.tetrahedra.empty())
     report_steps(run, model);
-  run.stats().set("digest", model_digest(model));
+  run.stats().set("digest", model::model_digest(model));
 }
 
 } // namespace
 
 int main(int argc, char** argv) {
   cli::Program p("exp2ela", "Turns a mesh into a deformable model.");
-  ModelArguments a;
-  declare(p, a);
-  declare_space(p, a.space);
-  declare_transform(p, a.transform);
+  cli::ModelArguments a;
+  cli::declare(p, a);
+  cli::declare_space(p, a.space);
+  cli::declare_transform(p, a.transform);
   p.output_kinds(all_outputs());
   p.input_kinds(all_inputs());
   p.operand("MESH", a.mesh, "mesh, tetrahedra or model");
-  p.check([&] { complete(a); });
-  return p.run(argc, argv,
-               [&](cli::Run& run) { a.list_materials ? list_materials(run, a) : work(run, a); });
+  p.check([&] { cli::complete(a); });
+  return p.run(argc, argv, [&](cli::Run& run) {
+    a.list_materials ? cli::list_materials(run, a) : work(run, a);
+  });
 }

@@ -14,13 +14,14 @@ using namespace gewebe;
 namespace {
 
 /// The store that second stages are added to.
-std::optional<StiffnessStore> first_stages(const cli::Run& run, const StoreArguments& a) {
+std::optional<formats::StiffnessStore> first_stages(const cli::Run& run,
+                                                    const cli::StoreArguments& a) {
   if (a.stage == 1)
     return std::nullopt;
-  return StiffnessStore(run.output());
+  return formats::StiffnessStore(run.output());
 }
 
-void discard(Output& output, StiffnessStoreWriter& writer) {
+void discard(formats::Output& output, formats::StiffnessStoreWriter& writer) {
   output.keep_part(false);
   writer.remove_journal();
 }
@@ -50,36 +51,36 @@ void tell_when_interrupted(const std::string& part) {
   }
 }
 
-void work(cli::Run& run, const StoreArguments& a) {
+void work(cli::Run& run, const cli::StoreArguments& a) {
   const bool in_place = !a.update.empty() && run.output() == "-";
   const std::string& path = in_place ? a.update : run.output();
   if (path == "-")
     throw UsageError("expected -o FILE, since a store cannot go to standard output");
-  (void)output_kind("", path, Kind::hdf5, {Kind::hdf5});
-  Output::Options options = run.output_options(true);
+  (void)formats::output_kind("", path, formats::Kind::hdf5, {formats::Kind::hdf5});
+  formats::Output::Options options = run.output_options(true);
   options.sync = true;
-  const std::optional<StiffnessStore> first = first_stages(run, a);
-  std::optional<StiffnessStore> before_cut;
+  const std::optional<formats::StiffnessStore> first = first_stages(run, a);
+  std::optional<formats::StiffnessStore> before_cut;
   if (!a.update.empty())
     before_cut.emplace(a.update);
   options.part = a.touched.has_value() && !a.compress && !first;
   if (in_place || first)
-    allow_in_place(path);
-  Output output(path, options);
+    formats::allow_in_place(path);
+  formats::Output output(path, options);
   // What is no file is refused before the work.
-  StiffnessStoreWriter writer(output, first ? first->shard() : a.shard);
+  formats::StiffnessStoreWriter writer(output, first ? first->shard() : a.shard);
   if (options.part)
     tell_when_interrupted(output.temporary());
-  StoreTotals totals;
+  cli::StoreTotals totals;
   try {
     if (first)
-      copy_store(*first, writer, totals);
+      cli::copy_store(*first, writer, totals);
     if (before_cut)
-      update_store(run, a, *before_cut, writer, totals);
+      cli::update_store(run, a, *before_cut, writer, totals);
     else if (a.merge)
-      run.timed("merge", [&] { merge_stores(a.inputs, writer, totals); });
+      run.timed("merge", [&] { cli::merge_stores(a.inputs, writer, totals); });
     else
-      add_models(run, a, first ? &*first : nullptr, writer, totals);
+      cli::add_models(run, a, first ? &*first : nullptr, writer, totals);
     writer.close();
   } catch (const Cancelled&) {
     throw;
@@ -91,7 +92,8 @@ void work(cli::Run& run, const StoreArguments& a) {
   }
   try {
     if (a.verify) // what the disk holds, before it takes its name
-      run.timed("verify", [&] { verify_store(run, StiffnessStore(output.temporary()), path); });
+      run.timed("verify",
+                [&] { cli::verify_store(run, formats::StiffnessStore(output.temporary()), path); });
   } catch (const Error&) {
     discard(output, writer);
     throw;
@@ -99,7 +101,7 @@ void work(cli::Run& run, const StoreArguments& a) {
   output.commit();
   writer.remove_journal();
   if (run.stats_wanted())
-    report_store(run, path, totals, writer);
+    cli::report_store(run, path, totals, writer);
 }
 
 } // namespace
@@ -108,10 +110,10 @@ int main(int argc, char** argv) {
   cli::Program p("ffe-precompute",
                  "Factorises the stiffness of models and stores it, with columns of its "
                  "inverse on request.");
-  StoreArguments a;
-  declare(p, a);
-  p.check([&] { complete(a); });
+  cli::StoreArguments a;
+  cli::declare(p, a);
+  p.check([&] { cli::complete(a); });
   return p.run(argc, argv, [&](cli::Run& run) {
-    a.info ? print_store(run, a.inputs[0], a.verify) : work(run, a);
+    a.info ? cli::print_store(run, a.inputs[0], a.verify) : work(run, a);
   });
 }

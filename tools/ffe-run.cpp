@@ -27,39 +27,40 @@ using namespace gewebe;
 
 namespace {
 
-void work(cli::Run& run, const RunArguments& in) {
+void work(cli::Run& run, const cli::RunArguments& in) {
   if (!in.recover.empty())
-    return report_recovered(run, recover_result(in.recover));
-  const Kind kind = in.result.kind(run);
+    return cli::report_recovered(run, formats::recover_result(in.recover));
+  const formats::Kind kind = in.result.kind(run);
   const auto warn = [&](const std::string& text) { run.warn(text); };
-  const std::unique_ptr<ResultWriter> result = in.result.open(run, kind);
+  const std::unique_ptr<formats::ResultWriter> result = in.result.open(run, kind);
   const bool reads = in.listen.empty() || in.scene != "-";
-  const bool spoken = reads && (kind == Kind::unknown || (run.output() != "-" && !run.quiet()));
+  const bool spoken =
+      reads && (kind == formats::Kind::unknown || (run.output() != "-" && !run.quiet()));
   if (!spoken && in.listen.empty() && (in.serve || in.binary))
     throw UsageError(std::string(in.serve ? "--serve" : "--binary") +
                      " needs answers, but this run prints none, expected it without --to, "
                      "and without -q together with -o");
   const auto shared = // there when the first client comes
-      in.shapes.empty() ? nullptr : std::make_unique<SharedShapes>(in.shapes);
-  SceneAnswers answers(spoken, in.binary, in.listen, {.awake = in.awake, .warn = warn});
-  std::optional<EventLog> events;
+      in.shapes.empty() ? nullptr : std::make_unique<formats::SharedShapes>(in.shapes);
+  cli::SceneAnswers answers(spoken, in.binary, in.listen, {.awake = in.awake, .warn = warn});
+  std::optional<cli::EventLog> events;
   if (!in.events.empty())
     events.emplace(in.events, run.output_options(false));
-  StepLatency latency(in.rate.value_or(0));
+  cli::StepLatency latency(in.rate.value_or(0));
   if (!in.latencies.empty())
     latency.log_to(in.latencies, run.output_options(false));
-  std::optional<SceneProgress> progress;
-  start_progress(progress, run.progress_bar(), in.scene, !in.listen.empty());
-  std::optional<Input> input;
+  std::optional<cli::SceneProgress> progress;
+  cli::start_progress(progress, run.progress_bar(), in.scene, !in.listen.empty());
+  std::optional<formats::Input> input;
   if (reads)
     input.emplace(in.scene, false);
   const std::string name = input ? input->name() : "-"; // where names of files count from
-  std::optional<SceneRecord> record;
+  std::optional<cli::SceneRecord> record;
   if (!in.record.empty())
     record.emplace(in.record, run.output_options(false), name);
 
-  SceneOptions options;
-  options.files = scene_files(name, run.context(), warn);
+  cli::SceneOptions options;
+  options.files = cli::scene_files(name, run.context(), warn);
   options.warn = warn;
   options.distrust = [&](const std::string& text) { cli::distrust(run, "ffe-run", text); };
   options.serve = in.serve;
@@ -86,11 +87,11 @@ void work(cli::Run& run, const RunArguments& in) {
   if (progress)
     options.progress = [&](double time, std::uint64_t frames) { progress->advance(time, frames); };
   Context context = run.context();
-  context.cancelled = [] { return deferred_signal() != 0; };
-  SceneRun scene(input ? name : in.listen, context, options);
-  RunLogs logs(events ? &*events : nullptr, record ? &*record : nullptr, latency);
-  ResultWriter* const kept = in.no_partial ? nullptr : result.get();
-  outlive_failures(kept, logs);
+  context.cancelled = [] { return formats::deferred_signal() != 0; };
+  cli::SceneRun scene(input ? name : in.listen, context, options);
+  cli::RunLogs logs(events ? &*events : nullptr, record ? &*record : nullptr, latency);
+  formats::ResultWriter* const kept = in.no_partial ? nullptr : result.get();
+  cli::outlive_failures(kept, logs);
   try {
     run.timed("run", [&] {
       answers.run(input ? &*input : nullptr, scene);
@@ -104,14 +105,14 @@ void work(cli::Run& run, const RunArguments& in) {
       answers.commit();
     });
   } catch (const Error& error) {
-    end_failed_run(error, kept, logs, scene.simulation().time());
+    cli::end_failed_run(error, kept, logs, scene.simulation().time());
   }
   if (const std::optional<Error> error = run.timed("write", [&] { return logs.commit(); }))
     throw Error(*error);
   if (run.stats_wanted())
-    report_scene(run, scene, latency, {in.rate.value_or(0), options.measure_error});
+    cli::report_scene(run, scene, latency, {in.rate.value_or(0), options.measure_error});
   if (in.verify)
-    require_verified(scene.simulation().counts().elastostatic, in.tolerance);
+    cli::require_verified(scene.simulation().counts().elastostatic, in.tolerance);
   if (const std::optional<Error> error = scene.first_error())
     run.fail_at_end(*error);
 }
@@ -120,10 +121,10 @@ void work(cli::Run& run, const RunArguments& in) {
 
 int main(int argc, char** argv) {
   cli::Program p("ffe-run", "Runs a scene of deformable objects, command by command.");
-  RunArguments in;
+  cli::RunArguments in;
   in.declare(p);
   const int status = p.run(argc, argv, [&](cli::Run& run) { work(run, in); });
-  if (deferred_signal() != 0)
-    end_by_deferred_signal();
+  if (formats::deferred_signal() != 0)
+    formats::end_by_deferred_signal();
   return status;
 }

@@ -69,14 +69,14 @@ std::optional<std::string> page_file(const std::string& name) {
       const fs::path folder = here() / "../share/man" / ("man" + section);
       for (const fs::path& path :
            {folder / file, folder / (file + ".gz"), here() / "../../man" / file})
-        if (fs::exists(path, failure) && (path.parent_path() == folder || !is_tool(name)))
+        if (fs::exists(path, failure) && (path.parent_path() == folder || !cli::is_tool(name)))
           return path.lexically_normal().string();
     }
   return std::nullopt;
 }
 
 void write_text(const std::string& text) {
-  Output output("-", {.binary = false});
+  formats::Output output("-", {.binary = false});
   output.write(text);
   output.commit();
 }
@@ -88,42 +88,43 @@ void show_help(const std::string& page) {
     if (file)
       become("man", {"man", "-l", *file});
   } catch (const Error&) {
-    if (!is_tool(page))
+    if (!cli::is_tool(page))
       throw;
   }
-  if (!is_tool(page))
+  if (!cli::is_tool(page))
     throw Error("no page '" + page + "', expected a program or a page that gewebe(7) names");
   start(page, {"", "--help"});
 }
 
 void work(const std::vector<std::string>& words) {
   const std::string word = words.size() > 1 ? words[1] : "";
-  if (is_tool(word))
+  if (cli::is_tool(word))
     start(word, {words.begin() + 1, words.end()});
   if (word.empty())
     throw UsageError("expected a program, see gewebe --list");
   if (word == "help" && words.size() == 3)
     return show_help(words[2]);
-  if (const std::string_view how = way_to(word); !how.empty())
+  if (const std::string_view how = cli::way_to(word); !how.empty())
     throw UsageError("no program '" + word + "', but " + std::string(how) + ", see gewebe --list");
   if (words.size() > 2)
     throw UsageError("unexpected '" + words[2] + "' after " + word + ", see gewebe --help");
   if (word == "-h" || word == "--help" || word == "help")
-    return write_text(std::string(usage) + tool_list());
+    return write_text(std::string(usage) + cli::tool_list());
   if (word == "--list")
-    return write_text(tool_list());
+    return write_text(cli::tool_list());
   if (word == "--version")
     return write_text(cli::version_text("gewebe"));
   std::vector<std::string> known{"plot", "help", "--help", "--list", "--version"};
-  std::ranges::copy(tool_names(), std::back_inserter(known));
-  throw UsageError("no program '" + word + "'" + suggestion(word, known) + ", see gewebe --list");
+  std::ranges::copy(cli::tool_names(), std::back_inserter(known));
+  throw UsageError("no program '" + word + "'" + text::suggestion(word, known) +
+                   ", see gewebe --list");
 }
 
 } // namespace
 
 int main(int argc, char** argv) {
   if (argc > 1 && std::string_view(argv[1]) == "plot")
-    return run_plot(argc - 1, argv + 1);
+    return cli::run_plot(argc - 1, argv + 1);
   try {
     work({argv, argv + argc});
     return 0;

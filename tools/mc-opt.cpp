@@ -13,7 +13,7 @@ int main(int argc, char** argv) {
                        "Turns a volume into a closed triangle mesh of its isosurface, with "
                        "fewer and better triangles than marching cubes alone; or into "
                        "tetrahedra that fill it.");
-  MeshArguments arguments;
+  cli::MeshArguments arguments;
   program.option("--iso", arguments.isovalue, "V", "isovalue; default: that of the volume");
   program
       .option("--epsilon", arguments.epsilon, "E",
@@ -48,7 +48,7 @@ int main(int argc, char** argv) {
   program.option("--refine", arguments.refine, "SELECTOR:SIZE[;...]",
                  "with --tets: cells of at most SIZE mm there, such as sphere:0,0,50,8:2");
   program.option("--grade", arguments.grade, "G", "with --tets: cells double inwards up to G times")
-      .range(0, stuffing_grade_max);
+      .range(0, stuffing::stuffing_grade_max);
   program.option(
       "--materials", arguments.materials, "LABELS|VDB[,VDB...]",
       "with --tets: materials by labels, or 1, 2 … inside these volumes and 0 elsewhere");
@@ -58,11 +58,11 @@ int main(int argc, char** argv) {
       .one_of({"stair", "follow"});
   program.option("--label", arguments.labels, "L[-M][,L...]",
                  "with --materials LABELS: use these labels alone, such as 1,4-7");
-  declare_space(program, arguments.space);
-  program.output_kinds(writable_kinds());
+  cli::declare_space(program, arguments.space);
+  program.output_kinds(cli::writable_kinds());
   program.operand("VOLUME", arguments.volume, "OpenVDB volume");
-  program.check([&] { check(arguments); });
+  program.check([&] { cli::check(arguments); });
   return program.run(argc, argv, [&](cli::Run& run) {
-    arguments.tets ? mesh_solid(run, arguments) : mesh_surface(run, arguments);
+    arguments.tets ? cli::mesh_solid(run, arguments) : cli::mesh_surface(run, arguments);
   });
 }

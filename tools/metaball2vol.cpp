@@ -21,7 +21,7 @@ struct Arguments {
   std::optional<double> voxel, band;
   std::optional<std::int64_t> dim;
   std::vector<double> bbox;
-  VolumeOutput output;
+  cli::VolumeOutput output;
 };
 
 void check(const Arguments& arguments) {
@@ -35,16 +35,16 @@ void check(const Arguments& arguments) {
       throw UsageError("--bbox: expected x0,y0,z0,x1,y1,z1 with x0 < x1, y0 < y1, z0 < z1");
 }
 
-GridInfo lattice(const Arguments& arguments, const Particles& particles, const Context& context,
-                 Space& space) {
-  GridInfo info;
+volume::GridInfo lattice(const Arguments& arguments, const Particles& particles,
+                         const Context& context, Space& space) {
+  volume::GridInfo info;
   if (arguments.voxel) {
-    info.transform = uniform_transform(*arguments.voxel);
+    info.transform = volume::uniform_transform(*arguments.voxel);
   } else if (arguments.dim) {
-    info.transform = lattice_for_dim(support_box(particles), *arguments.dim);
+    info.transform = volume::lattice_for_dim(support_box(particles), *arguments.dim);
   } else {
-    Input input(arguments.like);
-    info.transform = read_volume(input, context, &space).info().transform;
+    formats::Input input(arguments.like);
+    info.transform = formats::read_volume(input, context, &space).info().transform;
     if (!info.transform.is_cubic())
       throw Error(input.name(), "has " + info.transform.describe() + ", expected cubic voxels");
   }
@@ -58,31 +58,32 @@ std::string count_text(double count) {
 }
 
 void work(cli::Run& run, const Arguments& arguments) {
-  Output output = open_volume(run);
-  Input input(arguments.particles, /*binary=*/false);
+  formats::Output output = cli::open_volume(run);
+  formats::Input input(arguments.particles, /*binary=*/false);
   const Particles particles = run.timed("read", [&] {
-    return read_particles(input.read_all(run.context().max_memory), input.name(),
-                          unit_in_mm(arguments.unit));
+    return formats::read_particles(input.read_all(run.context().max_memory), input.name(),
+                                   formats::unit_in_mm(arguments.unit));
   });
-  DensityOptions options;
-  VolumeOutput result = arguments.output;
+  density::DensityOptions options;
+  cli::VolumeOutput result = arguments.output;
   options.info = lattice(arguments, particles, run.context(), result.space);
   if (const auto& b = arguments.bbox; !b.empty())
     options.clip = Box3{{b[0], b[1], b[2]}, {b[3], b[4], b[5]}};
   options.band = arguments.band;
-  options.planned = [&](const DensityReport& plan) {
+  options.planned = [&](const density::DensityReport& plan) {
     run.say("at most " + count_text(plan.predicted_voxels) + " voxels in " +
             bytes_text(plan.predicted_bytes) + ", about " + count_text(plan.predicted_evaluations) +
             " evaluations");
   };
-  DensityReport report;
-  const Grid grid = run.timed("density", [&] {
-    return at(input.name(),
-              [&] { return metaball_density(run.context(), particles, options, &report); });
+  density::DensityReport report;
+  const volume::Grid grid = run.timed("density", [&] {
+    return at(input.name(), [&] {
+      return density::metaball_density(run.context(), particles, options, &report);
+    });
   });
   if (grid.active_voxels() == 0)
     run.warn("no voxel centre lies inside a particle's support");
-  write(run, output, grid, result);
+  cli::write(run, output, grid, result);
 
   cli::Stats& stats = run.stats();
   stats.set("particles", static_cast<std::uint64_t>(particles.size()));
@@ -117,7 +118,7 @@ int main(int argc, char** argv) {
                  "keep only what mc-opt needs for the isosurface of ISO");
   program.option("--unit", arguments.unit, "UNIT", "unit of the particles: m, cm, mm")
       .one_of({"m", "cm", "mm"});
-  declare(program, arguments.output);
+  cli::declare(program, arguments.output);
   program.operand("PARTICLES", arguments.particles, "file with lines x y z R [weight]");
   program.check([&] { check(arguments); });
   return program.run(argc, argv, [&](cli::Run& run) { work(run, arguments); });

@@ -14,7 +14,7 @@ using namespace gewebe;
 namespace {
 
 struct Arguments {
-  MeshToVoxelize mesh;
+  cli::MeshToVoxelize mesh;
   std::string on_open = "error", rule = "parity", labels, threshold, space;
 };
 
@@ -29,23 +29,24 @@ void refuse_mesh_options(const cli::Program& p, const std::string& asked) {
 void complete(const cli::Program& p, Arguments& a) {
   const bool own_lattice = a.mesh.dim || !a.mesh.like.empty();
   if (!a.threshold.empty()) {
-    check_thresholds(a.threshold, !a.labels.empty(), own_lattice);
+    cli::check_thresholds(a.threshold, !a.labels.empty(), own_lattice);
     return refuse_mesh_options(p, "--threshold");
   }
   if (!a.labels.empty()) {
-    check_labels(a.labels, a.mesh.voxel.has_value(), own_lattice);
+    cli::check_labels(a.labels, a.mesh.voxel.has_value(), own_lattice);
     return refuse_mesh_options(p, "--label");
   }
   if (int{a.mesh.voxel.has_value()} + int{a.mesh.dim.has_value()} + int{!a.mesh.like.empty()} != 1)
     throw UsageError("expected exactly one of --voxel, --dim and --like");
   cli::check_one_pipe({a.mesh.name, a.mesh.like});
-  a.mesh.options.rule = voxel_rule_from_text(a.rule);
-  a.mesh.choice = antialias_from_text(a.mesh.antialias);
-  if (a.mesh.options.rule != VoxelRule::parity &&
-      (a.mesh.choice.filter == Antialias::exact || a.mesh.choice.filter == Antialias::lines))
+  a.mesh.options.rule = cli::voxel_rule_from_text(a.rule);
+  a.mesh.choice = cli::antialias_from_text(a.mesh.antialias);
+  if (a.mesh.options.rule != voxelization::VoxelRule::parity &&
+      (a.mesh.choice.filter == cli::Antialias::exact ||
+       a.mesh.choice.filter == cli::Antialias::lines))
     throw UsageError("--antialias " + a.mesh.antialias +
                      " goes with --rule parity, not with --rule " + a.rule);
-  a.mesh.options.on_open = open_mesh_from_text(a.on_open);
+  a.mesh.options.on_open = cli::open_mesh_from_text(a.on_open);
 }
 
 } // namespace
@@ -72,25 +73,27 @@ int main(int argc, char** argv) {
   p.option("--on-open", a.on_open, "WHAT",
            "open meshes: error, warn (odd rays stay empty), fill (close the holes)")
       .one_of({"error", "warn", "fill"});
-  p.option("--unit", a.mesh.unit, "UNIT", "unit of the mesh: m, cm, mm").one_of(mesh_unit_names());
+  p.option("--unit", a.mesh.unit, "UNIT", "unit of the mesh: m, cm, mm")
+      .one_of(formats::mesh_unit_names());
   p.option("--weld", a.mesh.weld, "MODE", "points at one place to merge: auto, all, part, none")
-      .one_of(weld_names());
-  declare_space(p, a.space);
-  declare_transform(p, a.mesh.transform);
-  declare(p, a.mesh.output);
-  p.input_kinds(readable_mesh_kinds());
+      .one_of(formats::weld_names());
+  cli::declare_space(p, a.space);
+  cli::declare_transform(p, a.mesh.transform);
+  cli::declare(p, a.mesh.output);
+  p.input_kinds(formats::readable_mesh_kinds());
   p.operand("MESH", a.mesh.name, "the mesh");
   p.check([&] { complete(p, a); });
   return p.run(argc, argv, [&](cli::Run& run) {
     a.mesh.output.space = space_from_name(a.space);
     if (!a.threshold.empty())
-      voxelize_scan(run, a.mesh.name, thresholds_from_text(a.threshold), a.mesh.voxel,
-                    a.mesh.output);
+      cli::voxelize_scan(run, a.mesh.name, cli::thresholds_from_text(a.threshold), a.mesh.voxel,
+                         a.mesh.output);
     else if (a.labels.empty())
-      voxelize_mesh(run, a.mesh);
+      cli::voxelize_mesh(run, a.mesh);
     else if (a.labels == "list")
-      list_labels(run, a.mesh.name, a.mesh.output);
+      cli::list_labels(run, a.mesh.name, a.mesh.output);
     else
-      voxelize_labels(run, a.mesh.name, labels_from_text(a.labels), a.mesh.voxel, a.mesh.output);
+      cli::voxelize_labels(run, a.mesh.name, cli::labels_from_text(a.labels), a.mesh.voxel,
+                           a.mesh.output);
   });
 }

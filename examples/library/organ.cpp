@@ -24,20 +24,20 @@ void make_organ(const char* model_file, const char* mesh_file) {
 
   // Particles: a centre and the radius of the support, mm. Together they have one density.
   const Particles particles{{{0, 0, 0}, 12}, {{9, 0, 0}, 10}};
-  DensityOptions lattice;
-  lattice.info.transform = uniform_transform(1); // voxels of 1 mm
-  const Grid volume = metaball_density(context, particles, lattice);
+  density::DensityOptions lattice;
+  lattice.info.transform = volume::uniform_transform(1); // voxels of 1 mm
+  const volume::Grid volume = density::metaball_density(context, particles, lattice);
 
   // The surface where the density is 0.5, its small triangles merged; then masses and springs, of
   // the material of the first preset, held by four central nodes that can't move.
-  const IsoSurface surface = marching_cubes_to_snap(context, volume);
-  const TriangleMesh mesh = snap(context, surface, {}).mesh;
-  Model model = build_model(mesh, {}, context).model;
+  const surface::IsoSurface surface = surface::marching_cubes_to_snap(context, volume);
+  const TriangleMesh mesh = surface::snap(context, surface, {}).mesh;
+  model::Model model = model::build_model(mesh, {}, context).model;
   model.name = "organ";
 
   // The stiffness is factorised once, then each load costs a solve or less.
-  Elastostatic organ(model, nullptr, context);
-  Load load;
+  statics::Elastostatic organ(model, nullptr, context);
+  contact::Load load;
   load.force[0] = {0, 0, 1000}; // on node 0, 1e-6 N
   organ.update(load);
   const std::span<const double> moved = organ.displacement(); // 3 numbers a node, mm
@@ -45,9 +45,9 @@ void make_organ(const char* model_file, const char* mesh_file) {
   TriangleMesh pulled = mesh;
   for (std::size_t i = 0; i < pulled.points.size(); ++i)
     pulled.points[i] += Vec3{moved[3 * i], moved[3 * i + 1], moved[3 * i + 2]};
-  Output text(model_file, {.binary = false}), binary(mesh_file, {});
-  write_ela(text, model, context);
-  binary.write(write_ply(pulled));
+  formats::Output text(model_file, {.binary = false}), binary(mesh_file, {});
+  formats::write_ela(text, model, context);
+  binary.write(formats::write_ply(pulled));
   text.commit();
   binary.commit();
   std::printf("%.9g %.9g %.9g\n", pulled.points[0].x, pulled.points[0].y, pulled.points[0].z);

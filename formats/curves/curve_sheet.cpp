@@ -6,7 +6,7 @@
 #include <array>
 #include <cmath>
 
-namespace gewebe {
+namespace gewebe::formats {
 
 namespace {
 
@@ -89,8 +89,8 @@ CurveSheet curve_sheet(const NumberColumn& x, std::span<const NumberColumn* cons
              unit_y = readable_unit(ys[0]->unit, in_y.size());
   CurveSheet sheet;
   sheet.title = title;
-  sheet.x = round_axis(in_x.min / unit_x.size, in_x.max / unit_x.size, 6);
-  sheet.y = round_axis(in_y.min / unit_y.size, in_y.max / unit_y.size, 5);
+  sheet.x = gewebe::text::round_axis(in_x.min / unit_x.size, in_x.max / unit_x.size, 6);
+  sheet.y = gewebe::text::round_axis(in_y.min / unit_y.size, in_y.max / unit_y.size, 5);
   sheet.x.title = axis_title(x.name, unit_x.name);
   for (const NumberColumn* const y : ys) {
     Curve& curve = sheet.curves.emplace_back();
@@ -106,4 +106,4 @@ CurveSheet curve_sheet(const NumberColumn& x, std::span<const NumberColumn* cons
   return sheet;
 }
 
-} // namespace gewebe
+} // namespace gewebe::formats

@@ -9,7 +9,7 @@
 #include <string>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::formats {
 
 struct Curve {
   std::string name;
@@ -18,7 +18,7 @@ struct Curve {
 
 struct CurveSheet {
   std::string title;
-  RoundAxis x, y;
+  gewebe::text::RoundAxis x, y;
   std::vector<Curve> curves;
 };
 
@@ -36,4 +36,4 @@ std::string curves_svg(const CurveSheet& sheet, double width, double height);
 /// Letters in lines of that many columns, from 40 x 10.
 std::string curves_ascii(const CurveSheet& sheet, std::size_t columns, std::size_t lines);
 
-} // namespace gewebe
+} // namespace gewebe::formats

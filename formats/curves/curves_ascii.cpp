@@ -4,7 +4,7 @@
 #include <cmath>
 #include <string_view>
 
-namespace gewebe {
+namespace gewebe::formats {
 
 namespace {
 
@@ -23,7 +23,7 @@ struct Letters {
 };
 
 /// Cell of a value on an axis of so many cells.
-std::size_t cell_of(const RoundAxis& axis, double value, std::size_t cells) {
+std::size_t cell_of(const gewebe::text::RoundAxis& axis, double value, std::size_t cells) {
   return static_cast<std::size_t>(
       std::lround((value - axis.min) / (axis.max - axis.min) * static_cast<double>(cells - 1)));
 }
@@ -81,4 +81,4 @@ std::string curves_ascii(const CurveSheet& sheet, std::size_t columns, std::size
   return text + std::string(room - sheet.x.title.size(), ' ') + sheet.x.title + "\n";
 }
 
-} // namespace gewebe
+} // namespace gewebe::formats

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <string_view>
 
-namespace gewebe {
+namespace gewebe::formats {
 
 namespace {
 
@@ -74,10 +74,10 @@ std::string stroke_of(std::size_t k) {
 struct Frame {
   double left = 0, right = 0, top = 0, bottom = 0;
 
-  double x(const RoundAxis& axis, double v) const {
+  double x(const gewebe::text::RoundAxis& axis, double v) const {
     return left + (right - left) * ((v - axis.min) / (axis.max - axis.min));
   }
-  double y(const RoundAxis& axis, double v) const {
+  double y(const gewebe::text::RoundAxis& axis, double v) const {
     return bottom - (bottom - top) * ((v - axis.min) / (axis.max - axis.min));
   }
 };
@@ -181,4 +181,4 @@ std::string curves_svg(const CurveSheet& sheet, double width, double height) {
   return svg + "</svg>\n";
 }
 
-} // namespace gewebe
+} // namespace gewebe::formats

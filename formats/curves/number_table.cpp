@@ -11,7 +11,7 @@
 #include <limits>
 #include <optional>
 
-namespace gewebe {
+namespace gewebe::formats {
 
 namespace {
 
@@ -56,7 +56,7 @@ void check_name(std::string_view name) {
     throw Error("a name of " + std::to_string(name.size()) + " bytes, expected up to " +
                 std::to_string(longest_name));
   while (!name.empty()) {
-    const std::size_t size = utf8_size(name);
+    const std::size_t size = gewebe::text::utf8_size(name);
     const auto first = static_cast<unsigned char>(name[0]);
     if (size == 0 || first < 0x20 || first == 0x7f)
       throw Error("a name that is no UTF-8 text, expected names in the first line");
@@ -85,7 +85,7 @@ std::optional<double> number_of(std::string_view cell) {
   double value = std::numeric_limits<double>::quiet_NaN();
   if (cell.empty())
     return value;
-  cell = without_plus(cell);
+  cell = gewebe::text::without_plus(cell);
   const auto [end, error] = std::from_chars(cell.data(), cell.data() + cell.size(), value);
   if (error != std::errc() || end != cell.data() + cell.size() || std::isinf(value))
     return std::nullopt;
@@ -101,7 +101,7 @@ std::string with_unit(const NumberColumn& column) {
 NumberTable read_number_table(std::string_view text, const std::string& name) {
   NumberTable table;
   for (std::size_t line = 1; !text.empty(); ++line)
-    at(name + ":" + std::to_string(line), [&] {
+    gewebe::at(name + ":" + std::to_string(line), [&] {
       const std::string_view row = take_line(text);
       if (row.empty() || row.starts_with('#'))
         return;
@@ -153,8 +153,8 @@ const NumberColumn& find_column(const NumberTable& table, std::string_view name)
       known.push_back(column.name);
       known.push_back(column.name.substr(column.name.rfind('.') + 1)); // all, if there is no '.'
     }
-    throw UsageError("no column " + asked + suggestion(name, known) + ", expected one of " +
-                     column_list(table));
+    throw UsageError("no column " + asked + gewebe::text::suggestion(name, known) +
+                     ", expected one of " + column_list(table));
   }
   std::string list;
   for (const NumberColumn* const column : found)
@@ -162,4 +162,4 @@ const NumberColumn& find_column(const NumberTable& table, std::string_view name)
   throw UsageError("several columns " + asked + ", expected one of " + list);
 }
 
-} // namespace gewebe
+} // namespace gewebe::formats

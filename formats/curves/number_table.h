@@ -6,7 +6,7 @@
 #include <string_view>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::formats {
 
 struct NumberColumn {
   std::string name;           ///< "probe.force"
@@ -31,4 +31,4 @@ const NumberColumn& find_column(const NumberTable& table, std::string_view name)
 /// "time [s], probe.force [uN]".
 std::string column_list(const NumberTable& table);
 
-} // namespace gewebe
+} // namespace gewebe::formats

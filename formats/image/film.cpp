@@ -13,7 +13,7 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
-namespace gewebe {
+namespace gewebe::formats {
 namespace {
 
 std::string size_text(const FilmOptions& options) {
@@ -33,7 +33,7 @@ std::vector<std::string> ffmpeg_words(const FilmOptions& options, const std::str
                                  "-s",
                                  size_text(options),
                                  "-r",
-                                 number_text(options.rate),
+                                 gewebe::text::number_text(options.rate),
                                  "-i",
                                  "pipe:0",
                                  "-pix_fmt",
@@ -90,7 +90,7 @@ FilmWriter::FilmWriter(Output& output, const FilmOptions& options) : output_(out
               "cannot start ffmpeg, which codes films: " + std::string(std::strerror(failure)) +
                   "; expected it, or the stream coded elsewhere: --to rgb -o - | ffmpeg -f "
                   "rawvideo -pix_fmt rgb24 -s " +
-                  size_text(options) + " -r " + number_text(options.rate) +
+                  size_text(options) + " -r " + gewebe::text::number_text(options.rate) +
                   " -i - -pix_fmt yuv420p FILM");
 }
 
@@ -110,7 +110,7 @@ void FilmWriter::wait_for_end() {
   child_ = -1;
 }
 
-void FilmWriter::add(const Image& picture) {
+void FilmWriter::add(const texture::Image& picture) {
   const auto* bytes = reinterpret_cast<const char*>(picture.values.data());
   for (std::size_t left = picture.values.size(); left > 0;) {
     const ssize_t sent = ::send(socket_, bytes, left, MSG_NOSIGNAL);
@@ -138,4 +138,4 @@ void FilmWriter::finish() {
                                   "for webm");
 }
 
-} // namespace gewebe
+} // namespace gewebe::formats

@@ -9,7 +9,7 @@
 #include <string>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::formats {
 
 /// mp4 (H.264) and webm (VP9).
 const std::vector<Kind>& film_kinds();
@@ -32,7 +32,7 @@ public:
   FilmWriter& operator=(const FilmWriter&) = delete;
 
   /// \pre three channels and the size of the film \throw Error if ffmpeg ended
-  void add(const Image& picture);
+  void add(const texture::Image& picture);
   /// Waits for ffmpeg; the caller commits. \throw Error if it failed
   void finish();
 
@@ -44,4 +44,4 @@ private:
   int status_ = 0;
 };
 
-} // namespace gewebe
+} // namespace gewebe::formats

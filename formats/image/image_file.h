@@ -9,22 +9,22 @@
 #include <string>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::formats {
 
 /// Reads a PNG or PNM; the first bytes tell which.
 /// \throw Error with place: neither of them, damaged, or beyond context.max_memory
-Image read_image(Input& input, const Context& context);
+texture::Image read_image(Input& input, const Context& context);
 
 /// Its brightness with all bits that it has, up to 16. \throw as read_image
-Heights read_heights(Input& input, const Context& context);
+texture::Heights read_heights(Input& input, const Context& context);
 
 /// png, ppm, rgb.
 const std::vector<Kind>& picture_kinds();
 
 /// The bytes of a png or ppm.
-std::string image_bytes(const Image& image, Kind kind);
+std::string image_bytes(const texture::Image& image, Kind kind);
 /// Writes a picture of three channels as png, ppm (P6) or rgb (the bare values); the caller
 /// commits. \throw what Output throws
-void write_image(Output& output, const Image& image, Kind kind);
+void write_image(Output& output, const texture::Image& image, Kind kind);
 
-} // namespace gewebe
+} // namespace gewebe::formats

@@ -17,7 +17,7 @@
 // libpng leaves its calls by longjmp. Functions that call it hold nothing with a destructor; what
 // they share stands in a Job that lives outside.
 
-namespace gewebe {
+namespace gewebe::formats {
 namespace {
 
 constexpr png_uint_32 max_side = 32768;
@@ -114,7 +114,7 @@ bool read_rows(Job& job, png_byte* pixels) {
   return true;
 }
 
-bool write_all(Job& job, const Image& image) {
+bool write_all(Job& job, const texture::Image& image) {
   if (setjmp(png_jmpbuf(job.png)) != 0)
     return false;
   png_set_write_fn(job.png, &job, take, flush);
@@ -168,7 +168,7 @@ private:
 }
 
 template <class Value>
-Pixels<Value> read(std::string_view bytes, const std::string& name) {
+texture::Pixels<Value> read(std::string_view bytes, const std::string& name) {
   Job job;
   job.bytes = bytes;
   job.deep = sizeof(Value) == 2;
@@ -181,7 +181,7 @@ Pixels<Value> read(std::string_view bytes, const std::string& name) {
     throw Error(name, std::to_string(job.width) + " x " + std::to_string(job.height) +
                           " pixels in " + std::to_string(bytes.size()) +
                           " bytes, expected a complete PNG");
-  Pixels<Value> image{job.width, job.height, job.channels, {}};
+  texture::Pixels<Value> image{job.width, job.height, job.channels, {}};
   image.values.resize(job.row_bytes / sizeof(Value) * job.height);
   if (!read_rows(job, reinterpret_cast<png_byte*>(image.values.data())))
     fail(job, name);
@@ -190,15 +190,15 @@ Pixels<Value> read(std::string_view bytes, const std::string& name) {
 
 } // namespace
 
-Image read_png(std::string_view bytes, const std::string& name) {
+texture::Image read_png(std::string_view bytes, const std::string& name) {
   return read<std::uint8_t>(bytes, name);
 }
 
-DeepImage read_deep_png(std::string_view bytes, const std::string& name) {
+texture::DeepImage read_deep_png(std::string_view bytes, const std::string& name) {
   return read<std::uint16_t>(bytes, name);
 }
 
-std::string write_png(const Image& image) {
+std::string write_png(const texture::Image& image) {
   std::string bytes;
   Job job;
   job.out = &bytes;
@@ -208,4 +208,4 @@ std::string write_png(const Image& image) {
   return bytes;
 }
 
-} // namespace gewebe
+} // namespace gewebe::formats

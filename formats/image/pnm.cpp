@@ -8,7 +8,7 @@
 #include <cstdint>
 #include <limits>
 
-namespace gewebe {
+namespace gewebe::formats {
 namespace {
 
 constexpr std::uint32_t max_side = 32768;
@@ -23,12 +23,12 @@ class Reader {
 public:
   Reader(std::string_view bytes, const std::string& name) : bytes_(bytes), name_(name) {}
 
-  Pixels<Value> read() {
+  texture::Pixels<Value> read() {
     const char letter = bytes_.size() > 1 && bytes_[0] == 'P' ? bytes_[1] : '?';
     if (letter != '2' && letter != '3' && letter != '5' && letter != '6')
       fail("no PNM, expected P2, P3, P5 or P6");
     at_ = 2;
-    Pixels<Value> image;
+    texture::Pixels<Value> image;
     image.channels = letter == '3' || letter == '6' ? 3 : 1;
     image.width = number("width", 1, max_side);
     image.height = number("height", 1, max_side);
@@ -97,7 +97,7 @@ private:
     return sum;
   }
 
-  void read_text(Pixels<Value>& image, std::size_t count) {
+  void read_text(texture::Pixels<Value>& image, std::size_t count) {
     // Each value takes two bytes, the last perhaps one.
     if (count > (bytes_.size() - at_ + 1) / 2)
       fail("too few bytes for " + std::to_string(count) + " values, expected a complete file");
@@ -109,7 +109,7 @@ private:
       fail("goes on after the last value, expected the end");
   }
 
-  void read_binary(Pixels<Value>& image, std::size_t count) {
+  void read_binary(texture::Pixels<Value>& image, std::size_t count) {
     ++at_; // the blank behind maxval
     const std::size_t width = maxval_ > 255 ? 2 : 1;
     const std::size_t left = at_ < bytes_.size() ? bytes_.size() - at_ : 0;
@@ -136,19 +136,19 @@ private:
 
 } // namespace
 
-Image read_pnm(std::string_view bytes, const std::string& name) {
+texture::Image read_pnm(std::string_view bytes, const std::string& name) {
   return Reader<std::uint8_t>(bytes, name).read();
 }
 
-DeepImage read_deep_pnm(std::string_view bytes, const std::string& name) {
+texture::DeepImage read_deep_pnm(std::string_view bytes, const std::string& name) {
   return Reader<std::uint16_t>(bytes, name).read();
 }
 
-std::string write_ppm(const Image& image) {
+std::string write_ppm(const texture::Image& image) {
   std::string bytes =
       "P6\n" + std::to_string(image.width) + " " + std::to_string(image.height) + "\n255\n";
   bytes.append(image.values.begin(), image.values.end());
   return bytes;
 }
 
-} // namespace gewebe
+} // namespace gewebe::formats

@@ -32,7 +32,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-namespace gewebe {
+namespace gewebe::formats {
 namespace {
 
 // ---- formats
@@ -267,7 +267,7 @@ private:
       for (const std::uint32_t corner : corners)
         polygon.push_back(points[corner]);
       cut.clear();
-      triangulate_polygon(polygon, cut);
+      mesh::triangulate_polygon(polygon, cut);
       stats_.polygons += corners.size() > 3;
       if (!part)
         part = part_of(node);
@@ -791,4 +791,4 @@ std::string write_by_assimp(const TriangleMesh& mesh, Kind kind) {
   }
 }
 
-} // namespace gewebe
+} // namespace gewebe::formats

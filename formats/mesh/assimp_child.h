@@ -11,7 +11,7 @@
 #include <string_view>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::formats {
 
 struct AssimpSource {
   std::string_view bytes;
@@ -45,4 +45,4 @@ double collada_metres(std::string_view bytes);
 /// \throw Error if there is no triangle, or a coordinate doesn't fit single precision
 std::string write_by_assimp(const TriangleMesh& mesh, Kind kind);
 
-} // namespace gewebe
+} // namespace gewebe::formats

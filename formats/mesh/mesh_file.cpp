@@ -10,7 +10,7 @@
 #include <algorithm>
 #include <utility>
 
-namespace gewebe {
+namespace gewebe::formats {
 namespace {
 
 /// Millimetres that the file says its numbers are in; the readers of these formats have scaled by
@@ -147,30 +147,31 @@ const std::vector<std::string>& weld_names() {
   return names;
 }
 
-std::optional<Weld> weld_from_name(std::string_view word) {
+std::optional<repair::Weld> weld_from_name(std::string_view word) {
   if (word.empty() || word == "auto")
     return std::nullopt;
   if (word == "all")
-    return Weld::all;
+    return repair::Weld::all;
   if (word == "part")
-    return Weld::part;
+    return repair::Weld::part;
   if (word == "none")
-    return Weld::none;
+    return repair::Weld::none;
   throw UsageError("welding " + std::string(word) + ", expected one of " + list(weld_names()));
 }
 
 TriangleMesh read_mesh(Input& input, const MeshReadOptions& options, MeshReadStats* stats) {
   check_readable(input, options);
-  return at(input.name(), [&] {
+  return gewebe::at(input.name(), [&] {
     MeshReadStats counts;
     const std::string bytes = input.read_all(options.max_memory);
     TriangleMesh mesh = read_unwelded(bytes, input, options, counts);
     if (!options.unit.empty())
       scale_points(mesh.points, millimetres_per(options.unit) / stated_unit(options.kind, bytes));
-    WeldOptions welding;
-    welding.mode = options.weld.value_or(options.kind == Kind::ply ? Weld::none : Weld::borders);
+    repair::WeldOptions welding;
+    welding.mode = options.weld.value_or(options.kind == Kind::ply ? repair::Weld::none
+                                                                   : repair::Weld::borders);
     welding.drop_unused = options.drop_unused;
-    counts.weld = weld(mesh, welding);
+    counts.weld = repair::weld(mesh, welding);
     counts.parts = count_parts(mesh);
     if (stats != nullptr)
       *stats = std::move(counts);
@@ -184,7 +185,7 @@ void write_mesh(Output& output, const TriangleMesh& mesh, Kind kind) {
                                         " is not written, expected one of " +
                                         kind_list(writable_mesh_kinds()));
   const auto sink = [&](std::string_view piece) { output.write(piece); };
-  at(output.name(), [&] {
+  gewebe::at(output.name(), [&] {
     if (kind == Kind::ply)
       write_ply(mesh, sink);
     else if (kind == Kind::obj)
@@ -196,4 +197,4 @@ void write_mesh(Output& output, const TriangleMesh& mesh, Kind kind) {
   });
 }
 
-} // namespace gewebe
+} // namespace gewebe::formats

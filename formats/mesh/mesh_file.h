@@ -12,7 +12,7 @@
 #include <string_view>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::formats {
 
 /// ply, obj, stl, off, dxf, gltf, glb, 3ds, dae, vtp, vtk.
 const std::vector<Kind>& readable_mesh_kinds();
@@ -29,13 +29,13 @@ void scale_points(std::vector<Vec3>& points, double scale);
 
 /// The words of --weld: "auto", "all", "part", "none". Nothing for "auto" and "".
 /// \throw UsageError if `word` is none of them
-std::optional<Weld> weld_from_name(std::string_view word);
+std::optional<repair::Weld> weld_from_name(std::string_view word);
 const std::vector<std::string>& weld_names();
 
 struct MeshReadOptions {
   Kind kind = Kind::unknown; ///< of input_kind()
   std::string unit;          ///< of the coordinates; "": mm, or what glTF, GLB and Collada state
-  std::optional<Weld>
+  std::optional<repair::Weld>
       weld; ///< nothing: Weld::none for PLY, whose indices count; Weld::borders else
   bool drop_unused = false;              ///< remove points that no triangle uses
   std::uint64_t max_memory = UINT64_MAX; ///< a larger input is refused
@@ -49,7 +49,7 @@ struct MeshReadStats {
   std::uint64_t parts = 0; ///< different part numbers; 1 if the mesh has none, 0 if it is empty
   /// Names of parts by their numbers, as the file has them (DXF layers, OBJ groups); "": none.
   std::vector<std::string> part_names;
-  WeldResult weld;
+  repair::WeldResult weld;
 };
 
 /// The mesh of `input`, converted to mm and welded; triangles with two equal corners are removed.
@@ -64,4 +64,4 @@ TriangleMesh read_mesh(Input& input, const MeshReadOptions& options,
 /// UsageError if the kind is not writable
 void write_mesh(Output& output, const TriangleMesh& mesh, Kind kind);
 
-} // namespace gewebe
+} // namespace gewebe::formats

@@ -11,7 +11,7 @@
 #include <unordered_map>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::formats {
 namespace {
 
 // Writes each distinct pair s t once, in order of first use; gives the number of each corner's,
@@ -97,4 +97,4 @@ void write_stl(const TriangleMesh& mesh, const Sink& sink) {
   out.flush();
 }
 
-} // namespace gewebe
+} // namespace gewebe::formats

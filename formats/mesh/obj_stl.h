@@ -7,7 +7,7 @@
 #include <functional>
 #include <string_view>
 
-namespace gewebe {
+namespace gewebe::formats {
 
 /// OBJ: v with every digit of the doubles, vt (each value once), vn if there are normals, f; an `o
 /// partN` and a `usemtl materialN` line where these change, if the mesh has them. No mtllib. \pre
@@ -20,4 +20,4 @@ void write_obj(const TriangleMesh& mesh, const std::function<void(std::string_vi
 /// \throw Error if a coordinate doesn't fit single precision, or there are over 2^32 - 1 triangles
 void write_stl(const TriangleMesh& mesh, const std::function<void(std::string_view)>& sink);
 
-} // namespace gewebe
+} // namespace gewebe::formats

@@ -8,7 +8,7 @@
 #include <cmath>
 #include <optional>
 
-namespace gewebe {
+namespace gewebe::formats {
 namespace {
 
 bool is_blank(char c) {
@@ -42,7 +42,7 @@ struct Line {
 
 double parse(std::string_view word, const Line& where) {
   double value = 0;
-  const std::string_view digits = without_plus(word);
+  const std::string_view digits = gewebe::text::without_plus(word);
   const auto [rest, status] = std::from_chars(digits.data(), digits.data() + digits.size(), value);
   if (status != std::errc{} || rest != digits.data() + digits.size())
     where.fail(quote(word) + " is no number, expected x y z R [weight]");
@@ -121,4 +121,4 @@ double unit_in_mm(std::string_view unit) {
   throw UsageError("--unit: '" + std::string(unit) + "', expected m, cm or mm");
 }
 
-} // namespace gewebe
+} // namespace gewebe::formats

@@ -6,7 +6,7 @@
 #include <string>
 #include <string_view>
 
-namespace gewebe {
+namespace gewebe::formats {
 
 /// Coordinates and radii are multiplied by `unit` (mm per unit of the file).
 /// \throw Error (place "name:LINE") for a line that is not four or five finite numbers or whose R
@@ -19,4 +19,4 @@ std::string write_particles(const Particles& particles);
 /// Millimetres per "mm", "cm" or "m". \throw UsageError for another word
 double unit_in_mm(std::string_view unit);
 
-} // namespace gewebe
+} // namespace gewebe::formats

@@ -14,7 +14,7 @@
 #include <string>
 #include <string_view>
 
-namespace gewebe {
+namespace gewebe::formats {
 
 /// What a reader passed over or changed.
 struct PlyStats {
@@ -37,4 +37,4 @@ std::string write_ply(const TriangleMesh& mesh);
 /// The same bytes, in pieces, to `sink`.
 void write_ply(const TriangleMesh& mesh, const std::function<void(std::string_view)>& sink);
 
-} // namespace gewebe
+} // namespace gewebe::formats

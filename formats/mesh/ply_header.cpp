@@ -7,7 +7,7 @@
 #include <utility>
 // Based on: Turk, The PLY polygon file format, 1994.
 
-namespace gewebe::ply {
+namespace gewebe::formats::ply {
 
 std::string quoted(std::string_view text) {
   std::string out = "\"";
@@ -226,4 +226,4 @@ Header read_header(std::string_view bytes, const std::string& name) {
   return HeaderReader(bytes, name).read();
 }
 
-} // namespace gewebe::ply
+} // namespace gewebe::formats::ply

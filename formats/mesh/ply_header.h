@@ -8,7 +8,7 @@
 #include <string_view>
 #include <vector>
 
-namespace gewebe::ply {
+namespace gewebe::formats::ply {
 
 enum class Type : std::uint8_t { int8, uint8, int16, uint16, int32, uint32, float32, float64 };
 
@@ -62,4 +62,4 @@ std::string quoted(std::string_view text);
 /// The header that `bytes` begin with. \throw Error, place "name:LINE"
 Header read_header(std::string_view bytes, const std::string& name);
 
-} // namespace gewebe::ply
+} // namespace gewebe::formats::ply

@@ -12,7 +12,7 @@
 #include <utility>
 // Based on: Turk, The PLY polygon file format, 1994.
 
-namespace gewebe {
+namespace gewebe::formats {
 namespace {
 
 using namespace ply;
@@ -92,7 +92,8 @@ private:
   std::int32_t whole(const Property& property) {
     const double value = source_.value(property.type);
     if (!(value >= 0 && value <= INT32_MAX && value == std::floor(value)))
-      source_.fail(property.name + " is " + number_text(value) + ", expected an integer from 0");
+      source_.fail(property.name + " is " + gewebe::text::number_text(value) +
+                   ", expected an integer from 0");
     return static_cast<std::int32_t>(value);
   }
 
@@ -203,8 +204,8 @@ private:
     for (std::size_t k = 0; k < size; ++k) {
       const double index = source_.value(property.type);
       if (!(index >= 0 && index < vertex_count() && index == std::floor(index)))
-        source_.fail("a face with corner " + number_text(index) + ", expected an index below " +
-                     number_text(vertex_count()));
+        source_.fail("a face with corner " + gewebe::text::number_text(index) +
+                     ", expected an index below " + gewebe::text::number_text(vertex_count()));
       faces_.corners.push_back(static_cast<std::uint32_t>(index));
     }
     return size;
@@ -260,7 +261,7 @@ private:
         polygon.clear();
         for (const std::uint32_t corner : corners)
           polygon.push_back(mesh_.points[corner]);
-        at(name_, [&] { triangulate_polygon(polygon, cut); });
+        gewebe::at(name_, [&] { mesh::triangulate_polygon(polygon, cut); });
       }
       for (const Triangle& t : cut) {
         mesh_.triangles.push_back({corners[t[0]], corners[t[1]], corners[t[2]]});
@@ -304,4 +305,4 @@ TriangleMesh read_ply(std::string_view bytes, const std::string& name, PlyStats*
   return BodyReader(BinarySource(bytes, name, header.bytes, swap), header, name).read(counts);
 }
 
-} // namespace gewebe
+} // namespace gewebe::formats

@@ -18,7 +18,7 @@
 #include <string_view>
 #include <utility>
 
-namespace gewebe::ply {
+namespace gewebe::formats::ply {
 
 static_assert(std::endian::native == std::endian::little, "the codec copies little-endian memory");
 
@@ -128,7 +128,7 @@ public:
     std::size_t size = 0;
     while (size < rest_.size() && !is_blank(rest_[size]))
       ++size;
-    const std::string_view word = rest_.substr(0, size), digits = without_plus(word);
+    const std::string_view word = rest_.substr(0, size), digits = gewebe::text::without_plus(word);
     const char* const end = digits.data() + digits.size();
     double number = 0;
     const auto [stop, error] = std::from_chars(digits.data(), end, number);
@@ -183,7 +183,8 @@ template <class Source>
 std::size_t list_size(Source& source, const Property& property) {
   const double count = source.value(*property.count_type);
   if (!(count >= 0 && count <= UINT32_MAX && count == std::floor(count)))
-    source.fail("a list of " + number_text(count) + " values, expected a count from 0");
+    source.fail("a list of " + gewebe::text::number_text(count) +
+                " values, expected a count from 0");
   const std::size_t size = static_cast<std::size_t>(count);
   if (size > source.left() / Source::min_size(property.type))
     source.fail("a list of " + std::to_string(size) + " values in " +
@@ -208,4 +209,4 @@ void skip_element(Source& source, const Element& element) {
   }
 }
 
-} // namespace gewebe::ply
+} // namespace gewebe::formats::ply

@@ -4,7 +4,7 @@
 #include <bit>
 // Based on: Turk, The PLY polygon file format, 1994.
 
-namespace gewebe {
+namespace gewebe::formats {
 namespace {
 
 static_assert(std::endian::native == std::endian::little, "the codec copies little-endian memory");
@@ -86,4 +86,4 @@ std::string write_ply(const TriangleMesh& mesh) {
   return bytes;
 }
 
-} // namespace gewebe
+} // namespace gewebe::formats

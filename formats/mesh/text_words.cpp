@@ -9,7 +9,7 @@
 #include <cmath>
 #include <system_error>
 
-namespace gewebe::text {
+namespace gewebe::formats::text {
 
 using ply::quoted;
 
@@ -62,7 +62,7 @@ std::string_view Words::line() {
 namespace {
 template <class Number>
 bool parse(std::string_view word, Number& number) {
-  word = without_plus(word);
+  word = gewebe::text::without_plus(word);
   const auto [stop, error] = std::from_chars(word.data(), word.data() + word.size(), number);
   return error == std::errc() && stop == word.data() + word.size();
 }
@@ -105,4 +105,4 @@ void Words::require(std::uint64_t count, std::size_t words, const char* what) co
          std::to_string(UINT32_MAX));
 }
 
-} // namespace gewebe::text
+} // namespace gewebe::formats::text

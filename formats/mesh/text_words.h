@@ -6,7 +6,7 @@
 #include <string>
 #include <string_view>
 
-namespace gewebe::text {
+namespace gewebe::formats::text {
 
 /// Words of a text, apart by blanks and line ends; where `comment` stands at the start of a word,
 /// the rest of the line is one. A NUL stands for no comments.
@@ -43,4 +43,4 @@ private:
   char comment_;
 };
 
-} // namespace gewebe::text
+} // namespace gewebe::formats::text

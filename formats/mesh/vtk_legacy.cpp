@@ -11,7 +11,7 @@
 #include <utility>
 // Based on: VTK file formats, docs.vtk.org, "Simple legacy formats".
 
-namespace gewebe::vtk {
+namespace gewebe::formats::vtk {
 namespace {
 
 static_assert(std::endian::native == std::endian::little, "binary files are big-endian");
@@ -470,4 +470,4 @@ bool is_legacy_grid(std::string_view first_bytes) {
   return at != std::string::npos && text.find("unstructured_grid", at) < at + 40;
 }
 
-} // namespace gewebe::vtk
+} // namespace gewebe::formats::vtk

@@ -11,7 +11,7 @@
 #include <string_view>
 #include <vector>
 
-namespace gewebe::vtk {
+namespace gewebe::formats::vtk {
 
 /// Cells as ranges of point numbers.
 struct LegacyCells {
@@ -45,9 +45,9 @@ Legacy read_legacy(std::string_view bytes, const std::string& name);
 /// Whether the first bytes are those of an unstructured grid in a legacy file.
 bool is_legacy_grid(std::string_view first_bytes);
 
-} // namespace gewebe::vtk
+} // namespace gewebe::formats::vtk
 
-namespace gewebe {
+namespace gewebe::formats {
 
 struct VtpStats;
 
@@ -55,4 +55,4 @@ struct VtpStats;
 /// an unstructured grid
 TriangleMesh read_vtk_surface(std::string_view bytes, const std::string& name, VtpStats* stats);
 
-} // namespace gewebe
+} // namespace gewebe::formats

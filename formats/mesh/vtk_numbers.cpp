@@ -14,7 +14,7 @@
 #include <type_traits>
 // Based on: VTK file formats, docs.vtk.org, "XML file formats"; RFC 4648 (base64).
 
-namespace gewebe::vtk {
+namespace gewebe::formats::vtk {
 namespace {
 
 using ply::quoted;
@@ -291,4 +291,4 @@ std::vector<std::int64_t> integers(const Array& array, const Encoding& encoding,
   return numbers_of<std::int64_t>(array, encoding, count, place);
 }
 
-} // namespace gewebe::vtk
+} // namespace gewebe::formats::vtk

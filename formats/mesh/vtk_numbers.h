@@ -7,7 +7,7 @@
 #include <string_view>
 #include <vector>
 
-namespace gewebe::vtk {
+namespace gewebe::formats::vtk {
 
 /// How the file stores arrays.
 struct Encoding {
@@ -33,4 +33,4 @@ std::vector<double> reals(const Array& array, const Encoding& encoding, std::uin
 std::vector<std::int64_t> integers(const Array& array, const Encoding& encoding,
                                    std::uint64_t count, const std::string& place);
 
-} // namespace gewebe::vtk
+} // namespace gewebe::formats::vtk

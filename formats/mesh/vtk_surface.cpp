@@ -6,7 +6,7 @@
 
 #include <utility>
 
-namespace gewebe {
+namespace gewebe::formats {
 namespace {
 
 class SurfaceReader {
@@ -56,7 +56,7 @@ private:
       std::vector<Vec3> polygon;
       for (const std::uint32_t corner : corners_)
         polygon.push_back(mesh_.points[corner]);
-      at(name_, [&] { triangulate_polygon(polygon, cut); });
+      gewebe::at(name_, [&] { mesh::triangulate_polygon(polygon, cut); });
     }
     for (const Triangle& t : cut)
       add({corners_[t[0]], corners_[t[1]], corners_[t[2]]}, cell);
@@ -90,4 +90,4 @@ TriangleMesh read_vtk_surface(std::string_view bytes, const std::string& name, V
   return mesh;
 }
 
-} // namespace gewebe
+} // namespace gewebe::formats

@@ -10,7 +10,7 @@
 #include <utility>
 // Based on: VTK file formats, docs.vtk.org, "XML file formats".
 
-namespace gewebe::vtk {
+namespace gewebe::formats::vtk {
 
 using ply::quoted;
 
@@ -339,4 +339,4 @@ Cells Piece::cells(const std::string& section, std::uint64_t count) const {
   return cells;
 }
 
-} // namespace gewebe::vtk
+} // namespace gewebe::formats::vtk

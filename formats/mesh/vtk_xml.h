@@ -16,7 +16,7 @@
 #include <string_view>
 #include <vector>
 
-namespace gewebe::vtk {
+namespace gewebe::formats::vtk {
 
 /// Cells by their nodes.
 struct Cells {
@@ -88,4 +88,4 @@ inline void take_corners(const std::string& name, const std::string& place,
     corners.push_back(node_number(node, points, fail));
 }
 
-} // namespace gewebe::vtk
+} // namespace gewebe::formats::vtk

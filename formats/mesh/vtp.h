@@ -7,7 +7,7 @@
 #include <string>
 #include <string_view>
 
-namespace gewebe {
+namespace gewebe::formats {
 
 struct VtpStats {
   std::uint64_t polygons = 0;           ///< with more than three corners, cut into triangles
@@ -22,4 +22,4 @@ struct VtpStats {
 /// parts or materials beside both polygons and strips, whose order VTK's programs do not share
 TriangleMesh read_vtp(std::string_view bytes, const std::string& name, VtpStats* stats = nullptr);
 
-} // namespace gewebe
+} // namespace gewebe::formats

@@ -9,7 +9,7 @@
 #include <vector>
 // Based on: VTK file formats, docs.vtk.org, "XML file formats".
 
-namespace gewebe {
+namespace gewebe::formats {
 namespace {
 
 class VtpReader {
@@ -98,7 +98,7 @@ private:
         polygon.clear();
         for (const std::uint32_t corner : corners_)
           polygon.push_back(mesh_.points[corner]);
-        at(name_, [&] { triangulate_polygon(polygon, cut); });
+        gewebe::at(name_, [&] { mesh::triangulate_polygon(polygon, cut); });
       }
       for (const Triangle& t : cut)
         add({corners_[t[0]], corners_[t[1]], corners_[t[2]]}, c);
@@ -136,4 +136,4 @@ TriangleMesh read_vtp(std::string_view bytes, const std::string& name, VtpStats*
   return mesh;
 }
 
-} // namespace gewebe
+} // namespace gewebe::formats

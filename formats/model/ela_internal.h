@@ -3,9 +3,9 @@
 
 #include <string_view>
 
-namespace gewebe {
+namespace gewebe::formats {
 
 /// Of each kind of spring.
 constexpr std::string_view kind_letters = "ebc";
 
-} // namespace gewebe
+} // namespace gewebe::formats

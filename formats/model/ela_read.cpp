@@ -12,7 +12,7 @@
 #include <utility>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::formats {
 
 namespace {
 
@@ -34,7 +34,7 @@ std::array<std::uint32_t, n> corners(Reader& in) {
 
 std::uint8_t fixed_axes(Reader& in) {
   const std::string_view word = in.word();
-  const std::optional<std::uint8_t> fixed = fixed_axes_from_name(word);
+  const std::optional<std::uint8_t> fixed = model::fixed_axes_from_name(word);
   if (!fixed)
     throw Error(shown(word) + " is no set of axes, expected -, x, y, z, xy, xz, yz or xyz");
   return *fixed;
@@ -42,8 +42,8 @@ std::uint8_t fixed_axes(Reader& in) {
 
 // Whole lines.
 
-Node node_of(Reader& in) {
-  Node node;
+model::Node node_of(Reader& in) {
+  model::Node node;
   node.position = vector(in, "coordinate");
   node.mass = in.number<double>("mass");
   node.drag = in.number<double>("drag");
@@ -60,15 +60,15 @@ Vec3 normal_of(Reader& in) {
   return normal;
 }
 
-Spring spring_of(Reader& in) {
-  Spring s;
+model::Spring spring_of(Reader& in) {
+  model::Spring s;
   s.i = in.number<std::uint32_t>("node");
   s.j = in.number<std::uint32_t>("node");
   const std::string_view letter = in.word();
   const std::size_t kind = letter.size() == 1 ? kind_letters.find(letter[0]) : std::string::npos;
   if (kind == std::string::npos)
     throw Error(shown(letter) + " is no kind of spring, expected e, b or c");
-  s.kind = static_cast<SpringKind>(kind);
+  s.kind = static_cast<model::SpringKind>(kind);
   s.stiffness = in.number<double>("stiffness");
   s.damping = in.number<double>("damping");
   s.rest = in.number<double>("rest length");
@@ -178,7 +178,7 @@ public:
   std::size_t line() const { return std::max<std::size_t>(in_.line(), 1); }
   Space stated_space() const { return space_; }
 
-  Model parse() {
+  model::Model parse() {
     header();
     name();
     if (section_ == "space")
@@ -325,15 +325,15 @@ private:
   }
 
   /// One of both, or both.
-  void law_and_prony(Material& m) {
+  void law_and_prony(model::Material& m) {
     std::string word(in_.word());
-    if (!is_prony(word)) {
-      m.law = parse_law(word);
+    if (!model::is_prony(word)) {
+      m.law = model::parse_law(word);
       if (in_.at_end())
         return;
       word = in_.word();
     }
-    m.prony = parse_prony(word);
+    m.prony = model::parse_prony(word);
   }
 
   void materials() {
@@ -345,7 +345,7 @@ private:
       const auto index = in_.number<std::uint64_t>("material index");
       if (index != i)
         throw Error("material index " + std::to_string(index) + ", expected " + std::to_string(i));
-      Material m;
+      model::Material m;
       m.name = in_.quoted("material name");
       m.density = in_.number<double>("density");
       m.young = in_.number<double>("Young's modulus");
@@ -435,7 +435,7 @@ private:
   }
 
   void skin() {
-    Skin& skin = model_.skin;
+    model::Skin& skin = model_.skin;
     const std::size_t points = optional_count(8, 0, nullptr);
     skin.points.reserve(points);
     for (std::size_t i = 0; i < points; ++i) {
@@ -470,8 +470,8 @@ private:
   }
 
   Reader in_;
-  Model model_;
-  ModelChecker check_;
+  model::Model model_;
+  model::ModelChecker check_;
   Context context_;
   Space space_ = Space::unknown;
   std::string_view section_;
@@ -481,11 +481,11 @@ private:
 
 } // namespace
 
-Model parse_ela(std::string_view text, const std::string& name, const Context& context,
-                Space* space) {
+model::Model parse_ela(std::string_view text, const std::string& name, const Context& context,
+                       Space* space) {
   Parser parser(text, context);
   try {
-    Model model = parser.parse();
+    model::Model model = parser.parse();
     if (space != nullptr)
       *space = parser.stated_space();
     return model;
@@ -494,13 +494,13 @@ Model parse_ela(std::string_view text, const std::string& name, const Context& c
   }
 }
 
-Model read_ela(Input& input, const Context& context, Space* space) {
+model::Model read_ela(Input& input, const Context& context, Space* space) {
   const std::string text = input.read_all(context.max_memory);
   // The lines that we write take more bytes as text than as data.
   const std::string what = "the model in " + std::to_string(text.size()) + " bytes of text";
-  at(input.name(),
-     [&] { require_memory(context, 2 * static_cast<double>(text.size()), what.c_str()); });
+  gewebe::at(input.name(),
+             [&] { require_memory(context, 2 * static_cast<double>(text.size()), what.c_str()); });
   return parse_ela(text, input.name(), context, space);
 }
 
-} // namespace gewebe
+} // namespace gewebe::formats

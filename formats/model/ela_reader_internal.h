@@ -11,7 +11,7 @@
 #include <string_view>
 #include <type_traits>
 
-namespace gewebe {
+namespace gewebe::formats {
 
 inline bool is_blank(char c) {
   return c == ' ' || c == '\t' || c == '\r';
@@ -132,4 +132,4 @@ private:
   std::size_t line_ = 0;
 };
 
-} // namespace gewebe
+} // namespace gewebe::formats

@@ -9,7 +9,7 @@
 #include <functional>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::formats {
 
 namespace {
 
@@ -76,7 +76,7 @@ void emit(const Sink& sink, const Context& context, std::string_view section, st
   }
 }
 
-void emit_skin(const Sink& sink, const Skin& skin, const Context& context) {
+void emit_skin(const Sink& sink, const model::Skin& skin, const Context& context) {
   emit(sink, context, "skin", skin.points.size(), [&](std::size_t i, LineWriter& line) {
     line.vector(skin.points[i]).number(skin.tetrahedron[i]).end();
   });
@@ -94,30 +94,31 @@ void emit_skin(const Sink& sink, const Skin& skin, const Context& context) {
          });
 }
 
-void emit_model(const Sink& sink, const Model& m, const Context& context,
+void emit_model(const Sink& sink, const model::Model& m, const Context& context,
                 Space space = Space::unknown) {
   sink("ela_expl 1\nname \"" + m.name + "\"\n");
   if (space != Space::unknown)
     sink("space " + std::string(space_name(space)) + "\n");
   sink("materials " + std::to_string(m.materials.size()) + "\n");
   for (std::size_t i = 0; i < m.materials.size(); ++i) {
-    const Material& k = m.materials[i];
-    sink(std::to_string(i) + " \"" + k.name + "\" " + number_text(k.density) + " " +
-         number_text(k.young) + " " + number_text(k.thickness) + " " +
-         number_text(k.damping_ratio) + (k.poisson ? " " + number_text(*k.poisson) : "") +
-         (k.law ? " " + law_text(*k.law) : "") +
-         (k.prony.empty() ? "" : " " + prony_text(k.prony)) + "\n");
+    const model::Material& k = m.materials[i];
+    sink(std::to_string(i) + " \"" + k.name + "\" " + gewebe::text::number_text(k.density) + " " +
+         gewebe::text::number_text(k.young) + " " + gewebe::text::number_text(k.thickness) + " " +
+         gewebe::text::number_text(k.damping_ratio) +
+         (k.poisson ? " " + gewebe::text::number_text(*k.poisson) : "") +
+         (k.law ? " " + model::law_text(*k.law) : "") +
+         (k.prony.empty() ? "" : " " + model::prony_text(k.prony)) + "\n");
   }
   emit(sink, context, "nodes", m.nodes.size(), [&](std::size_t i, LineWriter& line) {
-    const Node& n = m.nodes[i];
-    line.vector(n.position).number(n.mass).number(n.drag).word(fixed_axes_name(n.fixed));
+    const model::Node& n = m.nodes[i];
+    line.vector(n.position).number(n.mass).number(n.drag).word(model::fixed_axes_name(n.fixed));
     line.number(n.central).number(n.material).end();
   });
   if (!m.normals.empty())
     emit(sink, context, "normals", m.normals.size(),
          [&](std::size_t i, LineWriter& line) { line.vector(m.normals[i]).end(); });
   emit(sink, context, "springs", m.springs.size(), [&](std::size_t i, LineWriter& line) {
-    const Spring& s = m.springs[i];
+    const model::Spring& s = m.springs[i];
     line.number(s.i).number(s.j).word(kind_letters.substr(static_cast<std::size_t>(s.kind), 1));
     line.number(s.stiffness).number(s.damping).number(s.rest).end();
   });
@@ -147,14 +148,14 @@ void emit_model(const Sink& sink, const Model& m, const Context& context,
 
 } // namespace
 
-std::string ela_text(const Model& model) {
+std::string ela_text(const model::Model& model) {
   std::string text;
   emit_model([&](std::string_view piece) { text += piece; }, model, Context{});
   return text;
 }
 
-void write_ela(Output& output, const Model& model, const Context& context, Space space) {
+void write_ela(Output& output, const model::Model& model, const Context& context, Space space) {
   emit_model([&](std::string_view piece) { output.write(piece); }, model, context, space);
 }
 
-} // namespace gewebe
+} // namespace gewebe::formats

@@ -12,15 +12,15 @@
 #include <vector>
 // Based on: Abaqus Keywords Guide; FEBio User Manual 4.0, "Free format input".
 
-namespace gewebe {
+namespace gewebe::formats {
 namespace {
 
 constexpr std::array<std::pair<std::uint8_t, char>, 3> axes{
-    {{fixed_x, 'x'}, {fixed_y, 'y'}, {fixed_z, 'z'}}};
+    {{model::fixed_x, 'x'}, {model::fixed_y, 'y'}, {model::fixed_z, 'z'}}};
 
 /// Calls put(number from 1) for each node of an element.
 template <class Put>
-void for_nodes(const Model& model, std::size_t element, const Put& put) {
+void for_nodes(const model::Model& model, std::size_t element, const Put& put) {
   for (const std::uint32_t node : model.tetrahedra[element])
     put(std::uint64_t{node} + 1);
   if (!model.middles.empty())
@@ -28,7 +28,7 @@ void for_nodes(const Model& model, std::size_t element, const Put& put) {
       put(std::uint64_t{node} + 1);
 }
 
-std::vector<std::size_t> elements_of(const Model& model, std::size_t material) {
+std::vector<std::size_t> elements_of(const model::Model& model, std::size_t material) {
   std::vector<std::size_t> elements;
   for (std::size_t t = 0; t < model.tetrahedra.size(); ++t)
     if (static_cast<std::size_t>(model.tetrahedron_material[t]) == material)
@@ -36,27 +36,29 @@ std::vector<std::size_t> elements_of(const Model& model, std::size_t material) {
   return elements;
 }
 
-void require_solid(const Output& output, const Model& model, Kind kind) {
+void require_solid(const Output& output, const model::Model& model, Kind kind) {
   const std::string format(kind_name(kind));
   if (model.tetrahedra.empty())
     throw Error(output.name(), "a net of springs for " + format + ", expected a solid (--solid)");
   if (!model.springs.empty())
     throw Error(output.name(), std::to_string(model.springs.size()) + " springs of a solid for " +
                                    format + ", which this writer has not, expected none");
-  for (const Material& material : model.materials) {
+  for (const model::Material& material : model.materials) {
     if (!material.prony.empty())
       throw Error(output.name(), "material '" + material.name +
                                      "' has a Prony series, expected none for " + format);
-    if (material.law && (kind == Kind::inp || material.law->kind != HyperelasticLaw::neo_hookean))
-      throw Error(output.name(), "material '" + material.name + "' has the law " +
-                                     std::string(law_name(material.law->kind)) + ", expected " +
-                                     (kind == Kind::inp ? "none for inp"
-                                                        : "classical-neo-hookean or none for feb"));
+    if (material.law &&
+        (kind == Kind::inp || material.law->kind != model::HyperelasticLaw::neo_hookean))
+      throw Error(
+          output.name(),
+          "material '" + material.name + "' has the law " +
+              std::string(model::law_name(material.law->kind)) + ", expected " +
+              (kind == Kind::inp ? "none for inp" : "classical-neo-hookean or none for feb"));
   }
 }
 
 /// A name of letters, digits, '_' and '-', with the material's number, so that names differ.
-std::string plain_name(const Model& model, std::size_t material) {
+std::string plain_name(const model::Model& model, std::size_t material) {
   std::string name;
   for (const char c : model.materials[material].name)
     name += (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') ? c : '_';
@@ -66,10 +68,10 @@ std::string plain_name(const Model& model, std::size_t material) {
 /// Abaqus and CalculiX read 20 characters of a number.
 std::string number(double value) {
   constexpr std::size_t most = 20;
-  return limited_text(value, most);
+  return gewebe::text::limited_text(value, most);
 }
 
-void write_inp(Pieces& out, const Model& model) {
+void write_inp(Pieces& out, const model::Model& model) {
   out << "*HEADING\nUnits: mm, g, s, Pa; forces in 1e-6 N\n*NODE, NSET=NALL\n";
   for (std::size_t n = 0; n < model.nodes.size(); ++n) {
     const Vec3& p = model.nodes[n].position;
@@ -88,7 +90,7 @@ void write_inp(Pieces& out, const Model& model) {
     }
   }
   for (std::size_t m = 0; m < model.materials.size(); ++m) {
-    const Material& material = model.materials[m];
+    const model::Material& material = model.materials[m];
     if (elements_of(model, m).empty())
       continue;
     const std::string name = plain_name(model, m);
@@ -106,7 +108,7 @@ void write_inp(Pieces& out, const Model& model) {
       }
 }
 
-void write_feb_mesh(Pieces& out, const Model& model) {
+void write_feb_mesh(Pieces& out, const model::Model& model) {
   out << "<Mesh>\n<Nodes name=\"nodes\">\n";
   for (std::size_t n = 0; n < model.nodes.size(); ++n) {
     const Vec3& p = model.nodes[n].position;
@@ -143,19 +145,19 @@ void write_feb_mesh(Pieces& out, const Model& model) {
   out << "</Mesh>\n";
 }
 
-bool any_fixed(const Model& model, std::uint8_t axis) {
+bool any_fixed(const model::Model& model, std::uint8_t axis) {
   return std::ranges::any_of(model.nodes,
-                             [axis](const Node& node) { return (node.fixed & axis) != 0; });
+                             [axis](const model::Node& node) { return (node.fixed & axis) != 0; });
 }
 
-void write_feb(Pieces& out, const Model& model) {
+void write_feb(Pieces& out, const model::Model& model) {
   out << "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n"
          "<!-- Units: mm, g, s, Pa; forces in 1e-6 N -->\n"
          "<febio_spec version=\"4.0\">\n<Module type=\"solid\"/>\n<Control>\n"
          "<analysis>STATIC</analysis>\n<time_steps>10</time_steps>\n<step_size>0.1</step_size>\n"
          "</Control>\n<Material>\n";
   for (std::size_t m = 0; m < model.materials.size(); ++m) {
-    const Material& material = model.materials[m];
+    const model::Material& material = model.materials[m];
     if (elements_of(model, m).empty())
       continue;
     out << "<material id=\"" << m + 1 << "\" name=\"" << plain_name(model, m) << "\" type=\""
@@ -191,7 +193,7 @@ const std::vector<Kind>& solid_deck_kinds() {
   return kinds;
 }
 
-void write_solid_deck(Output& output, const Model& model, Kind kind) {
+void write_solid_deck(Output& output, const model::Model& model, Kind kind) {
   require_solid(output, model, kind);
   const Sink sink = [&](std::string_view piece) { output.write(piece); };
   Pieces out(sink);
@@ -202,4 +204,4 @@ void write_solid_deck(Output& output, const Model& model, Kind kind) {
   out.flush();
 }
 
-} // namespace gewebe
+} // namespace gewebe::formats

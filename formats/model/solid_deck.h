@@ -7,7 +7,7 @@
 
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::formats {
 
 /// inp, feb.
 const std::vector<Kind>& solid_deck_kinds();
@@ -20,6 +20,6 @@ const std::vector<Kind>& solid_deck_kinds();
 /// \pre check_model(model) passes, the kind is one of the above
 /// \throw Error with place: a model without tetrahedra or with springs; a law that the format or
 /// this writer has not, by name; what Output throws
-void write_solid_deck(Output& output, const Model& model, Kind kind);
+void write_solid_deck(Output& output, const model::Model& model, Kind kind);
 
-} // namespace gewebe
+} // namespace gewebe::formats

@@ -13,7 +13,7 @@
 #include <utility>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::formats {
 namespace {
 
 using Json = nlohmann::ordered_json;
@@ -80,7 +80,7 @@ Float3 difference(const Float3& a, const Float3& b) {
 
 /// From values of picture files (sRGB), 0 … 1.
 double linear(double value) {
-  return value <= 0.04045 ? value / 12.92 : power((value + 0.055) / 1.055, 2.4);
+  return value <= 0.04045 ? value / 12.92 : numeric::power((value + 0.055) / 1.055, 2.4);
 }
 
 /// Unit normals of points, means of faces by area; z where there is none.
@@ -332,4 +332,4 @@ std::uint64_t write_glb(Output& output, const ShownScene& scene) {
   return size;
 }
 
-} // namespace gewebe
+} // namespace gewebe::formats

@@ -7,7 +7,7 @@
 #include <cstdint>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::formats {
 
 /// Times of the animation in s: those of the frames, or 1/25 s each where the frames' times, as
 /// float32, do not grow strictly, as glTF requires.
@@ -21,4 +21,4 @@ std::vector<float> animation_times(const std::vector<double>& times);
 /// \throw Error if the file would have 4 GiB or more; what Output throws
 std::uint64_t write_glb(Output& output, const ShownScene& scene);
 
-} // namespace gewebe
+} // namespace gewebe::formats

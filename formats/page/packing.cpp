@@ -7,7 +7,7 @@
 #include <algorithm>
 #include <cmath>
 
-namespace gewebe {
+namespace gewebe::formats {
 namespace {
 
 constexpr double most = 65535;
@@ -119,4 +119,4 @@ std::string base64(std::string_view bytes) {
   return text;
 }
 
-} // namespace gewebe
+} // namespace gewebe::formats

@@ -11,7 +11,7 @@
 #include <string_view>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::formats {
 
 /// A grid of 16 bits over a box: place = origin + step (i, j, k).
 struct PlaceGrid {
@@ -38,4 +38,4 @@ std::string packed_corners(std::span<const Triangle> triangles);
 
 std::string base64(std::string_view bytes);
 
-} // namespace gewebe
+} // namespace gewebe::formats

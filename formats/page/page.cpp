@@ -13,7 +13,7 @@
 extern "C" const char gewebe_viewer_html[];
 extern "C" const char gewebe_viewer_js[];
 
-namespace gewebe {
+namespace gewebe::formats {
 namespace {
 
 using Json = nlohmann::ordered_json;
@@ -213,4 +213,4 @@ std::uint64_t write_page(Output& output, const ShownScene& scene) {
   return size;
 }
 
-} // namespace gewebe
+} // namespace gewebe::formats

@@ -11,7 +11,7 @@
 #include <string>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::formats {
 
 /// Consecutive triangles of one colour.
 struct ShownPaint {
@@ -77,4 +77,4 @@ struct ShownScene {
 /// Bytes of its points and values.
 double scene_bytes(const ShownScene& scene);
 
-} // namespace gewebe
+} // namespace gewebe::formats

@@ -6,7 +6,7 @@
 #include <limits>
 #include <utility>
 
-namespace gewebe::grid {
+namespace gewebe::formats::grid {
 
 namespace {
 
@@ -14,12 +14,12 @@ constexpr std::array<std::size_t, 6> tensor_order{0, 3, 5, 1, 4, 2};
 
 } // namespace
 
-Shape shape_of(const Model& model) {
+Shape shape_of(const model::Model& model) {
   Shape shape;
-  for (const Node& node : model.nodes)
+  for (const model::Node& node : model.nodes)
     shape.points.push_back(node.position);
   if (model.tetrahedra.empty()) {
-    const TriangleMesh mesh = surface_mesh(model);
+    const TriangleMesh mesh = model::surface_mesh(model);
     for (const Triangle& t : mesh.triangles)
       shape.nodes.insert(shape.nodes.end(), t.begin(), t.end());
     shape.material = mesh.material;
@@ -38,11 +38,11 @@ Shape shape_of(const Model& model) {
   return shape;
 }
 
-void Shapes::add(const Model& model) {
+void Shapes::add(const model::Model& model) {
   all_.insert(all_.begin() + static_cast<std::ptrdiff_t>(objects_++), shape_of(model));
 }
 
-void Shapes::change(std::size_t object, const Model& model) {
+void Shapes::change(std::size_t object, const model::Model& model) {
   all_.at(object) = shape_of(model);
 }
 
@@ -60,16 +60,16 @@ bool Shapes::set(std::span<const FrameInstrument> instruments) {
   constexpr std::size_t around = 32;
   std::vector<Instrument> there;
   for (std::size_t k = 0; k < instruments.size(); ++k)
-    if (instruments[k].present && shown_radius(instruments[k].shape) > 0)
+    if (instruments[k].present && contact::shown_radius(instruments[k].shape) > 0)
       there.push_back({k, instruments[k].shape, {}});
   const bool other =
       !std::ranges::equal(there, instruments_, [](const Instrument& a, const Instrument& b) {
-        return a.number == b.number && same_surface(a.shape, b.shape);
+        return a.number == b.number && contact::same_surface(a.shape, b.shape);
       });
   if (other) {
     all_.resize(objects_);
     for (Instrument& one : there) {
-      InstrumentSurface made = shown_surface(one.shape, around);
+      contact::InstrumentSurface made = contact::shown_surface(one.shape, around);
       one.own = std::move(made.points);
       Shape& shape = all_.emplace_back();
       shape.instrument = one.number;
@@ -135,9 +135,9 @@ std::vector<double> values_of(const std::vector<Shape>& shapes, const Field& fie
                     std::numeric_limits<double>::quiet_NaN());
       continue;
     }
-    for (const SymmetricBlock& tensor : (*shape.fields).*(field.tensors))
+    for (const linalg::SymmetricBlock& tensor : (*shape.fields).*(field.tensors))
       if (field.mises)
-        values.push_back(von_mises(tensor));
+        values.push_back(fem::von_mises(tensor));
       else
         for (const std::size_t k : tensor_order)
           values.push_back(tensor[k]);
@@ -145,4 +145,4 @@ std::vector<double> values_of(const std::vector<Shape>& shapes, const Field& fie
   return values;
 }
 
-} // namespace gewebe::grid
+} // namespace gewebe::formats::grid

@@ -15,7 +15,7 @@
 #include <span>
 #include <vector>
 
-namespace gewebe::grid {
+namespace gewebe::formats::grid {
 
 /// Cells of VTK's types: triangles where there are no tetrahedra.
 enum CellType : std::uint8_t { triangle = 5, tetrahedron = 10, quadratic = 24 };
@@ -27,7 +27,7 @@ struct Shape {
   std::vector<std::uint32_t> nodes; ///< of the cells
   std::vector<std::int32_t> material;
   std::vector<double> displacement;
-  std::optional<SolidFields> fields;
+  std::optional<fem::SolidFields> fields;
   std::optional<std::size_t> instrument; ///< of these
 
   std::size_t size() const { return type == triangle ? 3 : type == tetrahedron ? 4 : 10; }
@@ -35,14 +35,14 @@ struct Shape {
 };
 
 /// At rest, without fields.
-Shape shape_of(const Model& model);
+Shape shape_of(const model::Model& model);
 
 /// Of objects, and behind them of instruments. An instrument stands at rest where it was when one
 /// of them last came, went or got another shape.
 class Shapes {
 public:
-  void add(const Model& model);
-  void change(std::size_t object, const Model& model);
+  void add(const model::Model& model);
+  void change(std::size_t object, const model::Model& model);
   void set(std::span<const FrameObject> objects);
   /// Whether it is another set of shapes.
   bool set(std::span<const FrameInstrument> instruments);
@@ -51,7 +51,7 @@ public:
 private:
   struct Instrument {
     std::size_t number = 0; ///< of all
-    InstrumentShape shape;
+    contact::InstrumentShape shape;
     std::vector<Vec3> own; ///< points in its own coordinates
   };
   std::vector<Shape> all_;
@@ -74,22 +74,22 @@ std::vector<double> displacements(const std::vector<Shape>& shapes);
 /// Tensors of solids, or their equivalent stresses.
 struct Field {
   const char* name;
-  std::vector<SymmetricBlock> SolidFields::*tensors;
+  std::vector<linalg::SymmetricBlock> fem::SolidFields::*tensors;
   bool mises, of_cells;
 
   std::size_t components() const { return mises ? 1 : 6; }
 };
 inline constexpr std::array<Field, 3> node_fields{
-    {{"stress", &SolidFields::node_stress, false, false},
-     {"strain", &SolidFields::node_strain, false, false},
-     {"von_mises", &SolidFields::node_stress, true, false}}};
+    {{"stress", &fem::SolidFields::node_stress, false, false},
+     {"strain", &fem::SolidFields::node_strain, false, false},
+     {"von_mises", &fem::SolidFields::node_stress, true, false}}};
 inline constexpr std::array<Field, 3> cell_fields{
-    {{"element_stress", &SolidFields::element_stress, false, true},
-     {"element_strain", &SolidFields::element_strain, false, true},
-     {"element_von_mises", &SolidFields::element_stress, true, true}}};
+    {{"element_stress", &fem::SolidFields::element_stress, false, true},
+     {"element_strain", &fem::SolidFields::element_strain, false, true},
+     {"element_von_mises", &fem::SolidFields::element_stress, true, true}}};
 
 bool have_fields(const std::vector<Shape>& shapes);
 /// Of all nodes or cells, NaN where a shape has none. Tensors in VTK's order: xx yy zz xy yz xz.
 std::vector<double> values_of(const std::vector<Shape>& shapes, const Field& field);
 
-} // namespace gewebe::grid
+} // namespace gewebe::formats::grid

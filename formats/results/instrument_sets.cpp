@@ -7,7 +7,7 @@
 #include <cmath>
 #include <utility>
 
-namespace gewebe {
+namespace gewebe::formats {
 
 namespace {
 
@@ -28,9 +28,10 @@ void put(hdf5::Dataset& to, const Vec3& v) {
 }
 
 /// A rotation and a translation, row by row.
-std::vector<double> matrix_of(const Pose& pose) {
-  const std::array<Vec3, 3> columns{rotated(pose.turn, {1, 0, 0}), rotated(pose.turn, {0, 1, 0}),
-                                    rotated(pose.turn, {0, 0, 1})};
+std::vector<double> matrix_of(const contact::Pose& pose) {
+  const std::array<Vec3, 3> columns{contact::rotated(pose.turn, {1, 0, 0}),
+                                    contact::rotated(pose.turn, {0, 1, 0}),
+                                    contact::rotated(pose.turn, {0, 0, 1})};
   std::vector<double> matrix;
   for (int a = 0; a < 3; ++a) {
     for (const Vec3& column : columns)
@@ -74,7 +75,8 @@ InstrumentSets::Series InstrumentSets::begin(const std::string& name, std::uint6
 }
 
 void InstrumentSets::append(Series& to, const FrameInstrument& of) {
-  const auto kind = static_cast<std::uint8_t>(of.present ? static_cast<int>(kind_of(of.shape)) : 0);
+  const auto kind =
+      static_cast<std::uint8_t>(of.present ? static_cast<int>(contact::kind_of(of.shape)) : 0);
   to.kind.append(std::span<const std::uint8_t>(&kind, 1));
   const auto touched = static_cast<std::uint32_t>(of.present ? of.nodes : 0);
   to.touched.append(std::span<const std::uint32_t>(&touched, 1));
@@ -96,14 +98,14 @@ void InstrumentSets::append(Series& to, const FrameInstrument& of) {
 }
 
 void InstrumentSets::show(Series& to, const FrameInstrument& of, std::uint64_t frame) {
-  const double radius = shown_radius(of.shape);
+  const double radius = contact::shown_radius(of.shape);
   if (!of.present || !(radius > 0))
     return;
   if (to.surfaces.empty() || to.surfaces.back().end != frame ||
-      !same_surface(to.surfaces.back().shape, of.shape)) {
+      !contact::same_surface(to.surfaces.back().shape, of.shape)) {
     hdf5::Group group = to.surface_group.create_group(std::to_string(to.surfaces.size() + 1));
     group.set("first_frame", frame);
-    InstrumentSurface made = shown_surface(of.shape, around);
+    contact::InstrumentSurface made = contact::shown_surface(of.shape, around);
     std::vector<std::uint32_t> corners;
     corners.reserve(3 * made.triangles.size());
     for (const Triangle& t : made.triangles)
@@ -150,4 +152,4 @@ void InstrumentSets::add_frame(hdf5::Group& root, std::uint64_t frame,
   }
 }
 
-} // namespace gewebe
+} // namespace gewebe::formats

@@ -11,7 +11,7 @@
 #include <string>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::formats {
 
 class InstrumentSets {
 public:
@@ -23,7 +23,7 @@ public:
 private:
   /// Triangles at their places in some frames, one after the other.
   struct Surface {
-    InstrumentShape shape;
+    contact::InstrumentShape shape;
     std::uint64_t first = 0, end = 0; ///< frames
     std::uint64_t points = 0;
     hdf5::Dataset places;
@@ -44,4 +44,4 @@ private:
   std::vector<Series> series_; ///< by instrument
 };
 
-} // namespace gewebe
+} // namespace gewebe::formats

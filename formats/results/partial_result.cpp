@@ -25,7 +25,7 @@
 #include <utility>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::formats {
 
 namespace {
 
@@ -179,4 +179,4 @@ std::string frames_text(std::uint64_t frames) {
   return std::to_string(frames) + (frames == 1 ? " frame" : " frames");
 }
 
-} // namespace gewebe
+} // namespace gewebe::formats

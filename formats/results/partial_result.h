@@ -6,7 +6,7 @@
 #include <cstdint>
 #include <string>
 
-namespace gewebe {
+namespace gewebe::formats {
 
 struct PartialFrames {
   std::uint64_t frames = 0;
@@ -23,4 +23,4 @@ PartialFrames mark_partial(const std::string& path, const std::string& why);
 /// \throw Error if there is none, or it holds no frame
 KeptResult recover_result(const std::string& path);
 
-} // namespace gewebe
+} // namespace gewebe::formats

@@ -9,7 +9,7 @@
 #include <utility>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::formats {
 
 /// Names of objects, or of instruments, in the order of the scene.
 inline std::vector<std::string> ordered_names(const hdf5::Group& of) {
@@ -23,4 +23,4 @@ inline std::vector<std::string> ordered_names(const hdf5::Group& of) {
   return names;
 }
 
-} // namespace gewebe
+} // namespace gewebe::formats

@@ -10,7 +10,7 @@
 #include <optional>
 #include <utility>
 
-namespace gewebe {
+namespace gewebe::formats {
 
 namespace {
 
@@ -143,14 +143,14 @@ void read_triangles(const hdf5::Group& group, TriangleMesh& mesh) {
 }
 
 /// How a skin follows the nodes of a shape.
-SkinWeights read_skin_weights(const hdf5::Group& group, std::size_t nodes) {
+embedding::SkinWeights read_skin_weights(const hdf5::Group& group, std::size_t nodes) {
   const std::uint64_t count = rows_of_three(group.dataset("points", hdf5::Number::float64));
   const hdf5::Dataset followed = group.dataset("nodes", hdf5::Number::uint32),
                       weights = group.dataset("weights", hdf5::Number::float64);
   const std::uint64_t each = followed.shape().size() == 2 ? followed.shape()[1] : 0;
   followed.require_shape({count, each});
   weights.require_shape({count, each});
-  SkinWeights skin;
+  embedding::SkinWeights skin;
   skin.nodes = each;
   skin.node.resize(each * count);
   followed.read_rows(0, std::span<std::uint32_t>(skin.node));
@@ -165,7 +165,7 @@ SkinWeights read_skin_weights(const hdf5::Group& group, std::size_t nodes) {
 
 /// The skin of a shape in a frame, from the displacements of its nodes.
 void read_skin(const hdf5::Group& group, const FramePoints& nodes, ResultSurface& result) {
-  const SkinWeights skin = read_skin_weights(group, nodes.rest.size());
+  const embedding::SkinWeights skin = read_skin_weights(group, nodes.rest.size());
   const hdf5::Dataset points = group.dataset("points", hdf5::Number::float64);
   const std::uint64_t count = points.rows();
   std::vector<double> rest(3 * count);
@@ -178,7 +178,7 @@ void read_skin(const hdf5::Group& group, const FramePoints& nodes, ResultSurface
   }
   for (std::size_t i = 0; i < count; ++i)
     result.rest.push_back({rest[3 * i], rest[3 * i + 1], rest[3 * i + 2]});
-  result.mesh.points = displaced_skin(skin, result.rest, displacement);
+  result.mesh.points = embedding::displaced_skin(skin, result.rest, displacement);
   read_triangles(group, result.mesh);
 }
 
@@ -262,7 +262,7 @@ std::optional<ResultInstrument> read_instrument(const hdf5::Group& group, std::u
                                                 std::uint64_t frame) {
   std::uint8_t kind = 0;
   group.dataset("kind", hdf5::Number::uint8).read_rows(row, std::span<std::uint8_t>(&kind, 1));
-  if (kind == 0 || kind > static_cast<std::uint8_t>(InstrumentKind::mesh))
+  if (kind == 0 || kind > static_cast<std::uint8_t>(contact::InstrumentKind::mesh))
     return std::nullopt;
   const auto vector = [&](const char* name) {
     const auto [x, y, z] = read_row<3>(group, name, {3}, row);
@@ -271,7 +271,7 @@ std::optional<ResultInstrument> read_instrument(const hdf5::Group& group, std::u
   const auto ends = read_row<6>(group, "ends", {2, 3}, row);
   const auto pose = read_row<12>(group, "pose", {3, 4}, row);
   ResultInstrument read;
-  read.kind = static_cast<InstrumentKind>(kind);
+  read.kind = static_cast<contact::InstrumentKind>(kind);
   read.radius = read_row<1>(group, "radius", {}, row)[0];
   read.friction = read_row<1>(group, "friction", {}, row)[0];
   if (!(read.radius >= 0))
@@ -288,7 +288,7 @@ std::optional<ResultInstrument> read_instrument(const hdf5::Group& group, std::u
   group.dataset("touched", hdf5::Number::uint32)
       .read_rows(row, std::span<std::uint32_t>(&touched, 1));
   read.touched = touched;
-  if (read.kind == InstrumentKind::mesh)
+  if (read.kind == contact::InstrumentKind::mesh)
     read.surface = read_shown(group.group("surfaces"), frame);
   return read;
 }
@@ -354,7 +354,7 @@ ResultSurface read_result_surface(const std::string& path, const std::string& ob
   }
   if (whole.has("materials"))
     result.materials = whole.read_texts("materials");
-  at(path, [&] { check_mesh(result.mesh); });
+  gewebe::at(path, [&] { check_mesh(result.mesh); });
   return result;
 }
 
@@ -374,7 +374,7 @@ ResultSolid read_result_solid(const std::string& path, const std::string& object
     throw Error(path, "object '" + object + "' has no tetrahedra, expected a solid of them");
   FramePoints points = read_points(path, *shape, frame, false);
   result.rest = std::move(points.rest);
-  TetMesh& mesh = result.mesh;
+  tetrahedra::TetMesh& mesh = result.mesh;
   mesh.points = std::move(points.moved);
   const hdf5::Dataset tetrahedra = group.dataset("tetrahedra", hdf5::Number::uint32);
   const std::uint64_t count = tetrahedra.rows(),
@@ -393,7 +393,7 @@ ResultSolid read_result_solid(const std::string& path, const std::string& object
   mesh.material = group.read<std::int32_t>("tetrahedron_material", count);
   if (whole.has("materials"))
     result.materials = whole.read_texts("materials");
-  at(path, [&] { check_mesh(mesh); });
+  gewebe::at(path, [&] { tetrahedra::check_mesh(mesh); });
   return result;
 }
 
@@ -412,7 +412,7 @@ std::vector<double> read_result_surface_stress(const std::string& path, const st
     nodes.resize(surface_nodes(shape->group, nodes.size()));
     return nodes;
   }
-  const SkinWeights skin = read_skin_weights(shape->group.group("skin"), nodes.size());
+  const embedding::SkinWeights skin = read_skin_weights(shape->group.group("skin"), nodes.size());
   std::vector<double> values;
   for (std::size_t first = 0; first < skin.node.size(); first += skin.nodes) {
     // Outside the element the weights extrapolate; stresses stay between those of its nodes.
@@ -448,4 +448,4 @@ std::vector<double> read_result_values(const std::string& path, const std::strin
   return values;
 }
 
-} // namespace gewebe
+} // namespace gewebe::formats

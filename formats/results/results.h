@@ -13,7 +13,7 @@
 #include <string>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::formats {
 
 struct ResultIndex {
   std::vector<std::string> objects;     ///< in the order of the scene
@@ -39,7 +39,7 @@ ResultSurface read_result_surface(const std::string& path, const std::string& ob
 
 /// An object's tetrahedra in one frame. A mesh that is displaced may have turned ones.
 struct ResultSolid {
-  TetMesh mesh;                       ///< displaced points: all nodes of the object
+  tetrahedra::TetMesh mesh;           ///< displaced points: all nodes of the object
   std::vector<Vec3> rest;             ///< as many
   std::vector<std::string> materials; ///< names
   bool there = true;                  ///< false: a part that came off later, the mesh is empty
@@ -51,7 +51,7 @@ ResultSolid read_result_solid(const std::string& path, const std::string& object
 /// An instrument in one frame. Its own point r stands at rotation r + place, row by row.
 struct ResultInstrument {
   std::string name;
-  InstrumentKind kind = InstrumentKind::sphere;
+  contact::InstrumentKind kind = contact::InstrumentKind::sphere;
   double radius = 0, friction = 0;
   std::array<Vec3, 2> ends; ///< of its axis
   std::array<Vec3, 3> rotation;
@@ -82,4 +82,4 @@ const std::vector<std::string>& result_field_names();
 std::vector<double> read_result_values(const std::string& path, const std::string& object,
                                        std::size_t frame, const std::string& field);
 
-} // namespace gewebe
+} // namespace gewebe::formats

@@ -10,7 +10,7 @@
 #include <span>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::formats {
 
 namespace {
 
@@ -24,17 +24,18 @@ public:
 
   bool wants_models() const override { return false; }
 
-  void add_object(const std::string& name, const Model& /*model*/) override {
+  void add_object(const std::string& name, const model::Model& /*model*/) override {
     names_.push_back(name);
   }
 
   void add_frame(double time, std::span<const FrameObject> objects) override {
-    const std::string start = number_text(time) + ",";
+    const std::string start = gewebe::text::number_text(time) + ",";
     std::string rows;
     for (std::size_t i = 0; i < objects.size(); ++i)
-      for (const NodeVector& f : objects[i].forces)
-        rows += start + names_[i] + "," + std::to_string(f.node) + "," + number_text(f.value.x) +
-                "," + number_text(f.value.y) + "," + number_text(f.value.z) + "\n";
+      for (const contact::NodeVector& f : objects[i].forces)
+        rows += start + names_[i] + "," + std::to_string(f.node) + "," +
+                gewebe::text::number_text(f.value.x) + "," + gewebe::text::number_text(f.value.y) +
+                "," + gewebe::text::number_text(f.value.z) + "\n";
     output_.append_whole(rows);
     ++frames_;
     time_ = time;
@@ -73,7 +74,7 @@ public:
       cells_.emplace_back();
     }
     if (!std::isnan(value))
-      cells_[at->second] = number_text(value + 0.0); // -0 as 0
+      cells_[at->second] = gewebe::text::number_text(value + 0.0); // -0 as 0
   }
   /// Also the length of the vector.
   void set_vector(const std::string& owner, const std::string& quantity, const char* unit,
@@ -128,7 +129,7 @@ public:
   bool wants_models() const override { return false; }
   bool wants_curves() const override { return true; }
 
-  void add_object(const std::string& name, const Model& /*model*/) override {
+  void add_object(const std::string& name, const model::Model& /*model*/) override {
     names_.push_back(name);
   }
 
@@ -140,7 +141,7 @@ public:
         continue;
       }
       columns_.set_axes(name, "", "mm", i.pose.place);
-      const Quaternion& q = i.pose.turn;
+      const contact::Quaternion& q = i.pose.turn;
       columns_.set(name, "turn_w", "", q.w);
       columns_.set_axes(name, "turn_", "", {q.x, q.y, q.z});
       columns_.set_axes(name, "hand_", "mm", i.hand);
@@ -185,7 +186,7 @@ public:
 private:
   void set_object(const std::string& name, const FrameObject& object) {
     Vec3 force;
-    for (const NodeVector& f : object.forces)
+    for (const contact::NodeVector& f : object.forces)
       force += f.value;
     columns_.set_vector(name, "node_force", "uN", force);
     columns_.set(name, "force_nodes", "", static_cast<double>(object.forces.size()));
@@ -193,13 +194,13 @@ private:
       columns_.set(name, "largest_displacement", "mm", *object.largest_displacement);
     if (object.fields != nullptr) {
       double largest = 0;
-      for (const SymmetricBlock& stress : object.fields->node_stress)
-        if (const double size = von_mises(stress); !(size <= largest))
+      for (const linalg::SymmetricBlock& stress : object.fields->node_stress)
+        if (const double size = fem::von_mises(stress); !(size <= largest))
           largest = size;
       columns_.set(name, "largest_von_mises", "Pa", largest);
     }
     if (object.estimate != nullptr && *object.estimate) {
-      const DiscretisationError& error = **object.estimate;
+      const fem::DiscretisationError& error = **object.estimate;
       columns_.set(name, "estimate_relative", "", error.relative);
       columns_.set(name, "estimate_force", "uN", error.force);
       columns_.set(name, "estimate_displacement", "mm", error.displacement);
@@ -260,4 +261,4 @@ std::unique_ptr<ResultWriter> open_csv_result(const std::string& path,
   return std::make_unique<CurveTable>(path, options);
 }
 
-} // namespace gewebe
+} // namespace gewebe::formats

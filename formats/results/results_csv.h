@@ -7,11 +7,11 @@
 #include <memory>
 #include <string>
 
-namespace gewebe {
+namespace gewebe::formats {
 
 /// Without a temporary file (a pipe, a device) rows of frames are written by `commit`, since their
 /// columns are known only then. \throw Error, UsageError as Output
 std::unique_ptr<ResultWriter> open_csv_result(const std::string& path,
                                               const Output::Options& options, TableRows rows);
 
-} // namespace gewebe
+} // namespace gewebe::formats

@@ -10,21 +10,21 @@
 #include <optional>
 #include <utility>
 
-namespace gewebe {
+namespace gewebe::formats {
 
 namespace {
 
 /// All surfaces in one mesh; each is a part where there are several.
 class Shapes {
 public:
-  void add(const Model& model) {
-    surfaces_.push_back(shown_mesh(model));
-    skins_.push_back(skin_weights(model));
+  void add(const model::Model& model) {
+    surfaces_.push_back(model::shown_mesh(model));
+    skins_.push_back(embedding::skin_weights(model));
     last_.emplace_back(3 * model.nodes.size());
   }
-  void change(std::size_t object, const Model& model) {
-    surfaces_.at(object) = shown_mesh(model);
-    skins_[object] = skin_weights(model);
+  void change(std::size_t object, const model::Model& model) {
+    surfaces_.at(object) = model::shown_mesh(model);
+    skins_[object] = embedding::skin_weights(model);
     last_[object].assign(3 * model.nodes.size(), 0);
   }
   void set(std::span<const FrameObject> objects) {
@@ -34,7 +34,7 @@ public:
   void write(Kind kind, Output& output) const {
     const TriangleMesh mesh = joined();
     const auto sink = [&](std::string_view bytes) { output.write(bytes); };
-    at(output.name(), [&] {
+    gewebe::at(output.name(), [&] {
       check_mesh(mesh);
       if (kind == Kind::ply)
         write_ply(mesh, sink);
@@ -55,7 +55,7 @@ private:
       if (all.points.size() + mesh.points.size() > UINT32_MAX)
         throw Error("the objects have over 2^32 nodes, expected fewer");
       if (!skins_[k].node.empty())
-        mesh.points = displaced_skin(skins_[k], mesh.points, last_[k]);
+        mesh.points = embedding::displaced_skin(skins_[k], mesh.points, last_[k]);
       else
         for (std::size_t i = 0; i < mesh.points.size(); ++i)
           mesh.points[i] += Vec3{last_[k][3 * i], last_[k][3 * i + 1], last_[k][3 * i + 2]};
@@ -73,7 +73,7 @@ private:
   }
 
   std::vector<TriangleMesh> surfaces_;
-  std::vector<SkinWeights> skins_;
+  std::vector<embedding::SkinWeights> skins_;
   std::vector<std::vector<double>> last_;
 };
 
@@ -86,8 +86,10 @@ public:
       last_.emplace(path, options);
   }
 
-  void add_object(const std::string& /*name*/, const Model& model) override { shapes_.add(model); }
-  void change_object(std::size_t object, const Model& model,
+  void add_object(const std::string& /*name*/, const model::Model& model) override {
+    shapes_.add(model);
+  }
+  void change_object(std::size_t object, const model::Model& model,
                      std::span<const std::uint32_t> /*origin*/) override {
     shapes_.change(object, model);
   }
@@ -135,4 +137,4 @@ std::unique_ptr<ResultWriter> open_mesh_result(Kind kind, const std::string& pat
   return std::make_unique<ShapeWriter>(kind, path, options);
 }
 
-} // namespace gewebe
+} // namespace gewebe::formats

@@ -8,11 +8,11 @@
 #include <memory>
 #include <string>
 
-namespace gewebe {
+namespace gewebe::formats {
 
 /// The last shape, or a series of all frames. \param kind ply or obj
 /// \throw Error, UsageError as Output and for a wrong pattern
 std::unique_ptr<ResultWriter> open_mesh_result(Kind kind, const std::string& path,
                                                const Output::Options& options);
 
-} // namespace gewebe
+} // namespace gewebe::formats

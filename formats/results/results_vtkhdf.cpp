@@ -17,7 +17,7 @@
 #include <utility>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::formats {
 
 namespace {
 
@@ -100,11 +100,11 @@ public:
     });
   }
 
-  void add_object(const std::string& /*name*/, const Model& model) override {
+  void add_object(const std::string& /*name*/, const model::Model& model) override {
     shapes_.add(model);
     changed_ = true;
   }
-  void change_object(std::size_t object, const Model& model,
+  void change_object(std::size_t object, const model::Model& model,
                      std::span<const std::uint32_t> /*origin*/) override {
     shapes_.change(object, model);
     changed_ = true;
@@ -243,4 +243,4 @@ std::unique_ptr<ResultWriter> open_vtkhdf_result(const std::string& path,
   return std::make_unique<VtkHdfWriter>(path, options);
 }
 
-} // namespace gewebe
+} // namespace gewebe::formats

@@ -7,10 +7,10 @@
 #include <memory>
 #include <string>
 
-namespace gewebe {
+namespace gewebe::formats {
 
 /// All frames. \throw Error as Output, place = path; it needs a file
 std::unique_ptr<ResultWriter> open_vtkhdf_result(const std::string& path,
                                                  const Output::Options& options);
 
-} // namespace gewebe
+} // namespace gewebe::formats

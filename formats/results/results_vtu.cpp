@@ -11,7 +11,7 @@
 #include <type_traits>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::formats {
 
 namespace {
 
@@ -47,8 +47,10 @@ public:
       last_.emplace(path, options_);
   }
 
-  void add_object(const std::string& /*name*/, const Model& model) override { shapes_.add(model); }
-  void change_object(std::size_t object, const Model& model,
+  void add_object(const std::string& /*name*/, const model::Model& model) override {
+    shapes_.add(model);
+  }
+  void change_object(std::size_t object, const model::Model& model,
                      std::span<const std::uint32_t> /*origin*/) override {
     shapes_.change(object, model);
   }
@@ -91,7 +93,7 @@ private:
         "<VTKFile type=\"UnstructuredGrid\" version=\"1.0\" byte_order=\"LittleEndian\" "
         "header_type=\"UInt64\">\n<UnstructuredGrid>\n<FieldData>\n"
         "<DataArray type=\"Float64\" Name=\"TimeValue\" NumberOfTuples=\"1\" format=\"ascii\">" +
-        number_text(time_) + "</DataArray>\n</FieldData>\n<Piece NumberOfPoints=\"" +
+        gewebe::text::number_text(time_) + "</DataArray>\n</FieldData>\n<Piece NumberOfPoints=\"" +
         std::to_string(all.points.size() / 3) + "\" NumberOfCells=\"" +
         std::to_string(all.types.size()) + "\">\n<Points>\n";
     arrays.add(text, "Points", 3, all.points);
@@ -132,4 +134,4 @@ std::unique_ptr<ResultWriter> open_vtu_result(const std::string& path,
   return std::make_unique<VtuWriter>(path, options);
 }
 
-} // namespace gewebe
+} // namespace gewebe::formats

@@ -7,10 +7,10 @@
 #include <memory>
 #include <string>
 
-namespace gewebe {
+namespace gewebe::formats {
 
 /// The last frame, or a series of all. \throw Error, UsageError as Output and for a wrong pattern
 std::unique_ptr<ResultWriter> open_vtu_result(const std::string& path,
                                               const Output::Options& options);
 
-} // namespace gewebe
+} // namespace gewebe::formats

@@ -19,7 +19,7 @@
 #include <numeric>
 #include <optional>
 
-namespace gewebe {
+namespace gewebe::formats {
 
 namespace {
 
@@ -34,7 +34,7 @@ std::vector<float> in_single(std::span<const double> values, const char* what, c
   for (std::size_t i = 0; i < values.size(); ++i) {
     result[i] = static_cast<float>(values[i]);
     if (!std::isfinite(result[i]))
-      throw Error(std::string(what) + " of " + number_text(values[i]) + unit +
+      throw Error(std::string(what) + " of " + gewebe::text::number_text(values[i]) + unit +
                   " does not fit single precision, expected a smaller one");
   }
   return result;
@@ -66,7 +66,7 @@ struct FieldSets {
       create_frame_view(views, *set, row);
   }
 
-  void append(const SolidFields& fields) {
+  void append(const fem::SolidFields& fields) {
     add(stress, fields.node_stress, "a stress", " Pa");
     add(strain, fields.node_strain, "a strain", "");
     add_von_mises(von_mises, fields.node_stress);
@@ -85,19 +85,20 @@ private:
   static std::uint64_t chunk(std::uint64_t row) {
     return std::max<std::uint64_t>(1, 65536 / (4 * row));
   }
-  static void add(hdf5::Dataset& to, const std::vector<SymmetricBlock>& tensors, const char* what,
-                  const char* unit) {
+  static void add(hdf5::Dataset& to, const std::vector<linalg::SymmetricBlock>& tensors,
+                  const char* what, const char* unit) {
     std::vector<double> values;
     values.reserve(6 * tensors.size());
-    for (const SymmetricBlock& tensor : tensors)
+    for (const linalg::SymmetricBlock& tensor : tensors)
       values.insert(values.end(), tensor.begin(), tensor.end());
     to.append(std::span<const float>(in_single(values, what, unit)));
   }
-  static void add_von_mises(hdf5::Dataset& to, const std::vector<SymmetricBlock>& stresses) {
+  static void add_von_mises(hdf5::Dataset& to,
+                            const std::vector<linalg::SymmetricBlock>& stresses) {
     std::vector<double> values;
     values.reserve(stresses.size());
-    for (const SymmetricBlock& stress : stresses)
-      values.push_back(gewebe::von_mises(stress));
+    for (const linalg::SymmetricBlock& stress : stresses)
+      values.push_back(gewebe::fem::von_mises(stress));
     to.append(std::span<const float>(in_single(values, "a stress", " Pa")));
   }
 };
@@ -112,7 +113,7 @@ struct EstimateSets {
     group.set("first_frame", from);
   }
 
-  void append(const std::optional<DiscretisationError>& error) {
+  void append(const std::optional<fem::DiscretisationError>& error) {
     constexpr double none = std::numeric_limits<double>::quiet_NaN();
     add(relative, error ? error->relative : none);
     add(force, error ? error->force : none);
@@ -146,7 +147,7 @@ public:
     });
   }
 
-  void add_object(const std::string& name, const Model& model) override {
+  void add_object(const std::string& name, const model::Model& model) override {
     in_place([&] {
       Object& object = begin(name, model);
       const std::vector<float> rest(3 * model.nodes.size());
@@ -160,11 +161,11 @@ public:
     xdmf_->outlive_signals();
   }
 
-  void add_part(const std::string& name, const Model& model) override {
+  void add_part(const std::string& name, const model::Model& model) override {
     in_place([&] { begin(name, model).group.set("first_frame", frames_); });
   }
 
-  void change_object(std::size_t index, const Model& model,
+  void change_object(std::size_t index, const model::Model& model,
                      std::span<const std::uint32_t> origin) override {
     in_place([&] {
       Object& object = objects_.at(index);
@@ -203,7 +204,7 @@ public:
         Object& to = objects_.at(i);
         const std::vector<float> u = in_single(objects[i].displacement, "a displacement", " mm");
         to.displacement.append(std::span<const float>(u));
-        if (const SolidFields* const fields = objects[i].fields) {
+        if (const fem::SolidFields* const fields = objects[i].fields) {
           if (!to.fields) {
             hdf5::Group& group = to.shape_group ? *to.shape_group : to.group;
             to.fields.emplace(group.create_group("fields"), fields->node_stress.size(),
@@ -222,13 +223,13 @@ public:
             to.estimates.emplace(to.group.create_group("estimates"), frames_);
           to.estimates->append(*objects[i].estimate);
         }
-        const std::span<const NodeVector> forces = objects[i].forces;
+        const std::span<const contact::NodeVector> forces = objects[i].forces;
         if (forces.empty())
           continue;
         std::vector<std::uint64_t> frame(forces.size(), frames_);
         std::vector<std::uint32_t> node;
         std::vector<double> force;
-        for (const NodeVector& f : forces) {
+        for (const contact::NodeVector& f : forces) {
           node.push_back(f.node);
           force.insert(force.end(), {f.value.x, f.value.y, f.value.z});
         }
@@ -282,12 +283,12 @@ private:
   /// Whether a frame is one mesh, as readers want it that know of no other.
   bool stands_alone() const { return objects_.size() == 1 && !instrumented_; }
 
-  Object& begin(const std::string& name, const Model& model) {
+  Object& begin(const std::string& name, const model::Model& model) {
     hdf5::Group group = groups_->create_group(name);
     group.set("order", static_cast<std::uint32_t>(objects_.size()));
     group.set("model", model.name);
     std::vector<std::string> materials;
-    for (const Material& material : model.materials)
+    for (const model::Material& material : model.materials)
       materials.push_back(material.name);
     group.write_texts("materials", materials);
     hdf5::Dataset displacement = add_shape(group, model);
@@ -305,15 +306,15 @@ private:
   }
 
   /// What stands in a group of a model at rest; the displacements to come.
-  static hdf5::Dataset add_shape(hdf5::Group& group, const Model& model) {
+  static hdf5::Dataset add_shape(hdf5::Group& group, const model::Model& model) {
     const std::uint64_t n = model.nodes.size();
-    group.set("surface_nodes", static_cast<std::uint64_t>(surface_count(model)));
+    group.set("surface_nodes", static_cast<std::uint64_t>(model::surface_count(model)));
     std::vector<double> points;
     points.reserve(3 * n);
-    for (const Node& node : model.nodes)
+    for (const model::Node& node : model.nodes)
       points.insert(points.end(), {node.position.x, node.position.y, node.position.z});
     group.write("points", std::span<const double>(points), {n, 3});
-    add_triangles(group, surface_mesh(model));
+    add_triangles(group, model::surface_mesh(model));
     if (!model.tetrahedra.empty()) {
       const std::uint64_t nodes = model.middles.empty() ? 4 : 10;
       std::vector<std::uint32_t> elements;
@@ -334,10 +335,10 @@ private:
   }
 
   /// What a reader needs to show the skin without knowing elements.
-  static void add_skin(hdf5::Group& shape, const Model& model) {
+  static void add_skin(hdf5::Group& shape, const model::Model& model) {
     hdf5::Group group = shape.create_group("skin");
-    const SkinWeights follows = skin_weights(model);
-    const TriangleMesh mesh = shown_mesh(model);
+    const embedding::SkinWeights follows = embedding::skin_weights(model);
+    const TriangleMesh mesh = model::shown_mesh(model);
     const std::uint64_t count = mesh.points.size();
     std::vector<double> points;
     points.reserve(3 * count);
@@ -459,4 +460,4 @@ std::unique_ptr<ResultWriter> open_result(Kind kind, const std::string& path,
   }
 }
 
-} // namespace gewebe
+} // namespace gewebe::formats

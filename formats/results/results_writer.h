@@ -19,16 +19,16 @@
 #include <string_view>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::formats {
 
 /// An object in one frame.
 struct FrameObject {
-  std::span<const double> displacement; ///< 3 n numbers
-  std::span<const NodeVector> forces;   ///< at displaced nodes
+  std::span<const double> displacement;        ///< 3 n numbers
+  std::span<const contact::NodeVector> forces; ///< at displaced nodes
   /// Stresses of a solid, if requested: from one frame on in all.
-  const SolidFields* fields = nullptr;
+  const fem::SolidFields* fields = nullptr;
   /// Errors of its mesh, if requested; an empty one: they can't be estimated.
-  const std::optional<DiscretisationError>* estimate = nullptr;
+  const std::optional<fem::DiscretisationError>* estimate = nullptr;
   /// mm, of a node, if a curve is to have it.
   std::optional<double> largest_displacement{};
 };
@@ -44,8 +44,8 @@ struct FrameAttachment {
 struct FrameInstrument {
   std::string_view name; ///< as those of objects; no two have the same
   bool present = false;  ///< else what follows does not count
-  InstrumentShape shape;
-  Pose pose;
+  contact::InstrumentShape shape;
+  contact::Pose pose;
   Vec3 hand;               ///< that leads it: its own place where it is not coupled
   Vec3 force, torque;      ///< of all objects on it, 1e-6 N, and 1e-9 N m about its place
   std::uint64_t nodes = 0; ///< that it touches or grasps
@@ -76,13 +76,15 @@ public:
   virtual bool wants_curves() const { return false; }
   /// An object that is in all frames to come; in those before it was at rest. Names differ and need
   /// no quoting.
-  virtual void add_object(const std::string& name, const Model& model) = 0;
+  virtual void add_object(const std::string& name, const model::Model& model) = 0;
   /// One that came off another, which is in no frame before.
-  virtual void add_part(const std::string& name, const Model& model) { add_object(name, model); }
+  virtual void add_part(const std::string& name, const model::Model& model) {
+    add_object(name, model);
+  }
   /// The model of an object, in the order in which they were added, is another from the next frame
   /// on, as after a cut. Ignored by writers without shapes. \param origin by node: the node of its
   /// first model that it is, or is a copy of; empty: all as they came
-  virtual void change_object(std::size_t /*object*/, const Model& /*model*/,
+  virtual void change_object(std::size_t /*object*/, const model::Model& /*model*/,
                              std::span<const std::uint32_t> /*origin*/) {}
   /// All instruments, in an order that stays, as they are in the next frame alone. Ignored by
   /// writers without instruments.
@@ -117,4 +119,4 @@ std::unique_ptr<ResultWriter> open_result(Kind kind, const std::string& path,
                                           const Output::Options& options,
                                           TableRows rows = TableRows::frame);
 
-} // namespace gewebe
+} // namespace gewebe::formats

@@ -2,7 +2,7 @@
 
 #include "base/error.h"
 
-namespace gewebe {
+namespace gewebe::formats {
 
 std::string SeriesName::name(std::uint64_t frame) const {
   const std::string number = std::to_string(frame);
@@ -37,4 +37,4 @@ std::optional<KeptResult> series_kept(const std::string& path, std::uint64_t fra
   return KeptResult{frames_text(frames), time, true, "", path};
 }
 
-} // namespace gewebe
+} // namespace gewebe::formats

@@ -8,7 +8,7 @@
 #include <optional>
 #include <string>
 
-namespace gewebe {
+namespace gewebe::formats {
 
 /// The place of a number in the names of a series.
 struct SeriesName {
@@ -25,4 +25,4 @@ std::optional<SeriesName> series_in(const std::string& path);
 /// The files of a failed run, which are there already. \param path with its pattern
 std::optional<KeptResult> series_kept(const std::string& path, std::uint64_t frames, double time);
 
-} // namespace gewebe
+} // namespace gewebe::formats

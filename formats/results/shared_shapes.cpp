@@ -15,7 +15,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-namespace gewebe {
+namespace gewebe::formats {
 
 namespace {
 
@@ -195,4 +195,4 @@ void SharedShapes::write(std::uint64_t step, double time, std::span<const Shared
   head_.begun = head_.sequence = frame.sequence;
 }
 
-} // namespace gewebe
+} // namespace gewebe::formats

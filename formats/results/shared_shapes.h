@@ -27,7 +27,7 @@
 #include <utility>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::formats {
 
 inline constexpr std::uint64_t shared_magic = 0x4550414853425747; ///< "GWBSHAPE" in the file
 inline constexpr std::uint64_t shared_version = 1;
@@ -103,4 +103,4 @@ private:
   std::vector<std::pair<std::string, std::size_t>> layout_; ///< names, numbers of coordinates
 };
 
-} // namespace gewebe
+} // namespace gewebe::formats

@@ -8,7 +8,7 @@
 #include <span>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::formats {
 
 namespace {
 
@@ -186,7 +186,7 @@ std::vector<Instrument> read_instruments(const hdf5::Group& root) {
 }
 
 std::string time_text(double time) {
-  return "<Time Value=\"" + number_text(time) + "\"/>\n";
+  return "<Time Value=\"" + gewebe::text::number_text(time) + "\"/>\n";
 }
 
 /// Whether each frame is one mesh, and each of its arrays a dataset: for meshio and others that
@@ -317,4 +317,4 @@ std::uint64_t xdmf_bytes(const std::string& file, const std::string& object, boo
   return 1600 + 6 * names + (fields ? 6 * (420 + names) : 0);
 }
 
-} // namespace gewebe
+} // namespace gewebe::formats

@@ -8,7 +8,7 @@
 #include <string>
 #include <string_view>
 
-namespace gewebe {
+namespace gewebe::formats {
 
 /// \param name the HDF5 file's name, without folder, to which the text refers
 /// \throw Error if the file is no result, or what `write` throws
@@ -25,4 +25,4 @@ std::string xdmf_path(const std::string& path);
 /// Bytes that the text has at most for one frame of one object or instrument.
 std::uint64_t xdmf_bytes(const std::string& file, const std::string& object, bool fields);
 
-} // namespace gewebe
+} // namespace gewebe::formats

@@ -9,20 +9,20 @@
 #include <string>
 #include <variant>
 
-namespace gewebe {
+namespace gewebe::formats {
 
 struct ObjectCommand {
   std::string name, model, store; ///< files as the scene names them; no store: ""
-  Method method = Method::ela;
-  Integration integration = Integration::semi_implicit;
-  bool warp = false; ///< large rotations
-  SolidChoice solid; ///< how a solid moves
+  scene::Method method = scene::Method::ela;
+  scene::Integration integration = scene::Integration::semi_implicit;
+  bool warp = false;             ///< large rotations
+  integrator::SolidChoice solid; ///< how a solid moves
 };
 /// A change, without the numbers of named things, which scene_change() finds.
 struct ChangeCommand {
-  Change change;
+  scene::Change change;
   std::string object{}, other{}, instrument{};
-  std::optional<Selector> nodes{}, others{};
+  std::optional<model::Selector> nodes{}, others{};
   bool total = false;  ///< a force or mass is divided among the nodes
   std::string stage{}; ///< file of the second stage's model; none: ""
   std::string mesh{};  ///< file of an instrument's mesh; none: ""
@@ -34,7 +34,7 @@ struct EmitModelCommand {
 /// Answers tell stresses of a solid from now on, at these nodes or all; results hold them.
 struct EmitStressCommand {
   std::string object;
-  std::optional<Selector> nodes;
+  std::optional<model::Selector> nodes;
 };
 constexpr double default_step = 1.0 / 60; ///< s
 struct StepCommand {
@@ -58,7 +58,7 @@ struct QueryCommand {
   enum class Positions { none, rest, now };
   Kind kind = Kind::nodes;
   std::string object{};
-  std::optional<Selector> nodes{};
+  std::optional<model::Selector> nodes{};
   Positions positions = Positions::none;
 };
 
@@ -73,4 +73,4 @@ struct Command {
       what;
 };
 
-} // namespace gewebe
+} // namespace gewebe::formats

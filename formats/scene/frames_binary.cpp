@@ -8,7 +8,7 @@
 #include <cstddef>
 #include <span>
 
-namespace gewebe {
+namespace gewebe::formats {
 
 namespace {
 
@@ -37,19 +37,20 @@ void append_single(std::string& bytes, const Vec3& v) {
     append_single(bytes, v[a]);
 }
 
-void append_cutting(std::string& bytes, const Cutting& c, std::uint64_t step) {
-  const auto frame = [&](FrameKind kind, std::size_t object, auto... values) {
-    append_head(bytes, {kind, static_cast<std::uint32_t>(object), step, sizeof...(values)});
-    (append(bytes, static_cast<std::uint32_t>(values)), ...);
+void append_cutting(std::string& bytes, const scene::Cutting& c, std::uint64_t step) {
+  const auto frame = [&](gewebe::formats::FrameKind kind, std::size_t object, auto... values) {
+    gewebe::formats::append_head(
+        bytes, {kind, static_cast<std::uint32_t>(object), step, sizeof...(values)});
+    (gewebe::formats::append(bytes, static_cast<std::uint32_t>(values)), ...);
   };
   switch (c.kind) {
-  case Cutting::Kind::cut:
+  case scene::Cutting::Kind::cut:
     return frame(FrameKind::cut, c.object, c.springs, c.doubled, c.nodes);
-  case Cutting::Kind::part:
+  case scene::Cutting::Kind::part:
     return frame(FrameKind::part, c.part, c.object, c.nodes);
-  case Cutting::Kind::loose:
+  case scene::Cutting::Kind::loose:
     return frame(FrameKind::loose, c.object, c.nodes);
-  case Cutting::Kind::restored:
+  case scene::Cutting::Kind::restored:
     return frame(FrameKind::restored, c.object, c.nodes);
   }
 }
@@ -65,15 +66,15 @@ std::string text_frame(FrameKind kind, std::uint64_t step, std::string_view text
 
 } // namespace
 
-std::string binary_answer(const Simulation& simulation, std::uint64_t step,
+std::string binary_answer(const scene::Simulation& simulation, std::uint64_t step,
                           const AnswerFields& fields) {
   std::string bytes;
-  for (const MethodJump& jump : simulation.news().jumps) {
+  for (const scene::MethodJump& jump : simulation.news().jumps) {
     append_head(bytes, {FrameKind::jump, static_cast<std::uint32_t>(jump.object), step, 1});
     append_single(bytes, jump.size);
   }
   const auto objects = static_cast<std::uint32_t>(simulation.object_count());
-  for (const Cutting& c : simulation.news().cuttings)
+  for (const scene::Cutting& c : simulation.news().cuttings)
     append_cutting(bytes, c, step);
   for (std::uint32_t i = 0; simulation.settings().emits.any_shapes() && i < objects; ++i) {
     if (!topology_changed(simulation, i))
@@ -84,16 +85,16 @@ std::string binary_answer(const Simulation& simulation, std::uint64_t step,
       append(bytes, t);
   }
   for (std::uint32_t i = 0; simulation.settings().emits.forces && i < objects; ++i) {
-    const std::vector<NodeVector>& forces = simulation.contact_forces(i);
+    const std::vector<contact::NodeVector>& forces = simulation.contact_forces(i);
     append_head(bytes, {FrameKind::nodes, i, step, forces.size()});
-    for (const NodeVector& f : forces)
+    for (const contact::NodeVector& f : forces)
       append(bytes, f.node);
     append_head(bytes, {FrameKind::forces, i, step, 3 * forces.size()});
-    for (const NodeVector& f : forces)
+    for (const contact::NodeVector& f : forces)
       append_single(bytes, f.value);
   }
   for (std::uint32_t i = 0; simulation.settings().emits.any_shapes() && i < objects; ++i) {
-    const std::vector<Node>& nodes = simulation.model(i).nodes;
+    const std::vector<model::Node>& nodes = simulation.model(i).nodes;
     const bool all = simulation.settings().emits.shapes;
     const std::size_t count = all ? nodes.size() : simulation.surface_nodes(i);
     const std::span<const double> u =
@@ -112,7 +113,7 @@ std::string binary_answer(const Simulation& simulation, std::uint64_t step,
     for (const std::uint32_t node : of.nodes) {
       for (const double value : of.stress[node])
         append_single(bytes, value);
-      append_single(bytes, von_mises(of.stress[node]));
+      append_single(bytes, fem::von_mises(of.stress[node]));
     }
   }
   for (const EstimateAnswer& of : fields.estimates) {
@@ -125,7 +126,7 @@ std::string binary_answer(const Simulation& simulation, std::uint64_t step,
   }
   for (std::uint32_t k = 0;
        simulation.settings().emits.instruments && k < simulation.instrument_count(); ++k) {
-    const InstrumentReport report = simulation.instrument(k);
+    const scene::InstrumentReport report = simulation.instrument(k);
     if (!report.present)
       continue;
     append_head(bytes, {FrameKind::instrument, k, step, report.hand ? 12U : 9U});
@@ -137,7 +138,7 @@ std::string binary_answer(const Simulation& simulation, std::uint64_t step,
   return bytes + binary_sync(simulation, step);
 }
 
-std::string binary_sync(const Simulation& simulation, std::uint64_t step) {
+std::string binary_sync(const scene::Simulation& simulation, std::uint64_t step) {
   std::string bytes;
   append_head(bytes, {FrameKind::done, 0, step, 2});
   append(bytes, simulation.time());
@@ -159,4 +160,4 @@ std::string binary_ok(std::uint64_t step, std::uint64_t line) {
   return bytes;
 }
 
-} // namespace gewebe
+} // namespace gewebe::formats

@@ -9,7 +9,7 @@
 #include <string>
 #include <string_view>
 
-namespace gewebe {
+namespace gewebe::formats {
 
 inline constexpr std::uint32_t frame_magic = 0x46425747; ///< "GWBF" in the stream
 
@@ -46,11 +46,11 @@ struct FrameHead {
 /// then shapes of all objects, then nodes and stresses, then estimates, then instruments, as far as
 /// the scene emits them, then done. \pre as text_answer \throw Error where a number does not fit
 /// single precision
-std::string binary_answer(const Simulation& simulation, std::uint64_t step,
+std::string binary_answer(const scene::Simulation& simulation, std::uint64_t step,
                           const AnswerFields& fields = {});
 
 /// The frame that answers sync: done alone.
-std::string binary_sync(const Simulation& simulation, std::uint64_t step);
+std::string binary_sync(const scene::Simulation& simulation, std::uint64_t step);
 
 /// The frame that refuses a line, behind `step` answered steps; its text is text_error's.
 std::string binary_error(std::uint64_t step, std::string_view text);
@@ -59,4 +59,4 @@ std::string binary_error(std::uint64_t step, std::string_view text);
 std::string binary_ok(std::uint64_t step, std::uint64_t line);
 std::string binary_told(std::uint64_t step, std::string_view text);
 
-} // namespace gewebe
+} // namespace gewebe::formats

@@ -8,7 +8,7 @@
 #include <algorithm>
 #include <array>
 
-namespace gewebe {
+namespace gewebe::formats {
 
 namespace {
 
@@ -24,8 +24,8 @@ std::string verb_of(const char* usage) {
   return std::string(text.substr(0, text.find(' ')));
 }
 
-Measurement parse_measure(Words& in, const std::string& name) {
-  Measurement m;
+fit::Measurement parse_measure(Words& in, const std::string& name) {
+  fit::Measurement m;
   m.place = in.vector("number");
   bool any = false;
   for (auto& d : m.displacement)
@@ -68,7 +68,7 @@ Measurements parse_measurements(std::string_view text, const std::string& name) 
     const std::string_view line = text.substr(0, end);
     text.remove_prefix(std::min(end + 1, text.size()));
     const std::string place = name + ":" + std::to_string(number);
-    at(place, [&] {
+    gewebe::at(place, [&] {
       std::vector<std::string> words = scene_words(line);
       if (words.empty())
         return;
@@ -82,8 +82,8 @@ Measurements parse_measurements(std::string_view text, const std::string& name) 
           verbs.push_back(verb_of(one));
           list += (list.empty() ? "" : ", ") + verbs.back();
         }
-        throw Error(shown(verb) + " is no word of measurements" + suggestion(verb, verbs) +
-                    ", expected one of " + list);
+        throw Error(shown(verb) + " is no word of measurements" +
+                    gewebe::text::suggestion(verb, verbs) + ", expected one of " + list);
       }
       words.erase(words.begin());
       Words in(std::move(words), *usage);
@@ -96,4 +96,4 @@ Measurements parse_measurements(std::string_view text, const std::string& name) 
   return all;
 }
 
-} // namespace gewebe
+} // namespace gewebe::formats

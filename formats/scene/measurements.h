@@ -9,10 +9,10 @@
 #include <string_view>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::formats {
 
 struct MeasuredForce {
-  Selector nodes;
+  model::Selector nodes;
   Vec3 force;         ///< g mm/s²
   bool total = false; ///< divided among the nodes
 };
@@ -20,7 +20,7 @@ struct MeasuredForce {
 struct LoadCase {
   Vec3 gravity; ///< mm/s²
   std::vector<MeasuredForce> forces;
-  std::vector<Measurement> measurements;
+  std::vector<fit::Measurement> measurements;
 };
 
 struct Measurements {
@@ -32,4 +32,4 @@ struct Measurements {
 /// \throw Error with the place "NAME:LINE"; if there is neither a measurement nor a swing
 Measurements parse_measurements(std::string_view text, const std::string& name);
 
-} // namespace gewebe
+} // namespace gewebe::formats

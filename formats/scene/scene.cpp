@@ -15,7 +15,7 @@
 #include <string_view>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::formats {
 
 namespace {
 
@@ -32,7 +32,7 @@ double parse_damping(Words& in, std::string_view text) {
                frequency = in.number_in(text.substr(at + 1), "frequency");
   if (!(ratio >= 0) || !(frequency > 0))
     in.fail("a damping ratio below 0, or a frequency that is not positive");
-  const double damping = damping_per_stiffness(ratio, frequency);
+  const double damping = integrator::damping_per_stiffness(ratio, frequency);
   if (!std::isfinite(damping))
     in.fail("a damping that is not finite");
   return damping;
@@ -58,19 +58,20 @@ What parse_object(Words& in) {
   c.model = in.word("model");
   if (c.model.empty())
     in.fail("an empty file name");
-  std::optional<Method> method;
+  std::optional<scene::Method> method;
   while (!in.done()) {
     const std::string word = in.word("");
     if (word.starts_with("store=") && word.size() > 6 && c.store.empty())
       c.store = word.substr(6);
     else if ((word == "integration=implicit" || word == "integration=auto") &&
-             c.integration == Integration::semi_implicit)
-      c.integration =
-          word == "integration=implicit" ? Integration::implicit : Integration::automatic;
+             c.integration == scene::Integration::semi_implicit)
+      c.integration = word == "integration=implicit" ? scene::Integration::implicit
+                                                     : scene::Integration::automatic;
     else if (word == "rotation=warp" && !c.warp)
       c.warp = true;
     else if ((word == "law=corotational" || word == "law=neo-hookean") && !c.solid.law)
-      c.solid.law = word == "law=corotational" ? SolidLaw::corotational : SolidLaw::hyperelastic;
+      c.solid.law = word == "law=corotational" ? integrator::SolidLaw::corotational
+                                               : integrator::SolidLaw::hyperelastic;
     else if (word.starts_with("damping=") && !c.solid.damping)
       c.solid.damping = parse_damping(in, std::string_view(word).substr(8));
     else if (word.starts_with("bulk=") && !c.solid.bulk)
@@ -78,20 +79,20 @@ What parse_object(Words& in) {
     else if (word.starts_with("tolerance=") && !c.solid.tolerance)
       c.solid.tolerance = parse_tolerance(in, std::string_view(word).substr(10));
     else if ((word == "method=ffe" || word == "method=ela") && !method)
-      method = word == "method=ffe" ? Method::ffe : Method::ela;
+      method = word == "method=ffe" ? scene::Method::ffe : scene::Method::ela;
     else
       in.fail(shown(word) + " is no use here");
   }
-  c.method = method.value_or(c.store.empty() ? Method::ela : Method::ffe);
-  if (c.solid.bulk && c.method == Method::ffe)
+  c.method = method.value_or(c.store.empty() ? scene::Method::ela : scene::Method::ffe);
+  if (c.solid.bulk && c.method == scene::Method::ffe)
     in.fail("bulk= with method=ffe");
-  if (c.warp && c.method == Method::ela)
+  if (c.warp && c.method == scene::Method::ela)
     in.fail("rotation=warp with method=ela");
   return c;
 }
 
 /// Subject of a change: an object and its nodes.
-ChangeCommand parse_about(Words& in, Change change) {
+ChangeCommand parse_about(Words& in, scene::Change change) {
   ChangeCommand c{.change = std::move(change)};
   c.object = in.name();
   c.nodes = in.nodes();
@@ -100,7 +101,7 @@ ChangeCommand parse_about(Words& in, Change change) {
 
 What parse_force(Words& in) {
   ChangeCommand c = parse_about(in, {});
-  SetForce set;
+  scene::SetForce set;
   set.force = in.vector("number");
   c.total = in.take("total");
   set.period = in.time_after("period");
@@ -110,7 +111,7 @@ What parse_force(Words& in) {
 
 What parse_pressure(Words& in) {
   ChangeCommand c = parse_about(in, {});
-  SetPressure set;
+  scene::SetPressure set;
   set.pressure.pressure = in.number("number");
   set.pressure.period = in.time_after("period");
   c.change = set;
@@ -119,7 +120,7 @@ What parse_pressure(Words& in) {
 
 What parse_mass(Words& in) {
   ChangeCommand c = parse_about(in, {});
-  SetMass set;
+  scene::SetMass set;
   set.mass = in.number("mass");
   if (!(set.mass >= 0))
     in.fail("a negative mass");
@@ -132,7 +133,7 @@ What parse_attach(Words& in) {
   ChangeCommand c = parse_about(in, {});
   c.other = in.name();
   c.others = in.nodes();
-  Attach tie;
+  scene::Attach tie;
   tie.stiffness = in.number("stiffness");
   if (!(tie.stiffness > 0))
     in.fail("a stiffness that is not positive");
@@ -144,7 +145,7 @@ What parse_contact(Words& in) {
   ChangeCommand c;
   c.object = in.name();
   c.other = in.name();
-  SetContact set;
+  scene::SetContact set;
   set.separate = in.take("separate");
   if (in.take("friction"))
     set.friction = in.number("coefficient");
@@ -156,7 +157,7 @@ What parse_contact(Words& in) {
 
 What parse_displace(Words& in) {
   ChangeCommand c = parse_about(in, {});
-  SetDisplacement set;
+  scene::SetDisplacement set;
   set.displacement = in.vector("number");
   set.duration = in.time_after("over");
   c.change = set;
@@ -164,30 +165,30 @@ What parse_displace(Words& in) {
 }
 
 What parse_release(Words& in) {
-  return parse_about(in, Release{});
+  return parse_about(in, scene::Release{});
 }
 
 /// A quaternion, or the degrees of a turn about an axis.
-std::optional<Quaternion> parse_turn(Words& in) {
+std::optional<contact::Quaternion> parse_turn(Words& in) {
   if (in.take("turn")) {
     const Vec3 axis = in.vector("number");
     const double degrees = in.number("angle");
     if (axis == Vec3{})
       in.fail("an axis without direction");
-    return turn_about(axis, degrees);
+    return contact::turn_about(axis, degrees);
   }
   if (!in.take("quaternion"))
     return std::nullopt;
-  Quaternion q;
+  contact::Quaternion q;
   for (double* const part : {&q.w, &q.x, &q.y, &q.z})
     *part = in.number("number");
-  if (q == Quaternion{0, 0, 0, 0})
+  if (q == contact::Quaternion{0, 0, 0, 0})
     in.fail("a quaternion of length 0");
-  return unit(q);
+  return contact::unit(q);
 }
 
 /// Its friction, which all but blades may have.
-void parse_friction(Words& in, InstrumentShape& shape) {
+void parse_friction(Words& in, contact::InstrumentShape& shape) {
   if (!shape.blade && in.take("friction"))
     shape.friction = in.number("friction");
   if (!(shape.friction >= 0))
@@ -195,7 +196,7 @@ void parse_friction(Words& in, InstrumentShape& shape) {
 }
 
 /// The rest of a mesh's line; its radius stays 0 where none is said.
-What parse_mesh(Words& in, SetInstrument set) {
+What parse_mesh(Words& in, scene::SetInstrument set) {
   ChangeCommand c;
   c.instrument = set.name;
   c.mesh = in.word("file");
@@ -206,14 +207,14 @@ What parse_mesh(Words& in, SetInstrument set) {
       in.fail("a radius that is not positive");
   }
   set.pose.place = in.vector("number");
-  set.pose.turn = parse_turn(in).value_or(Quaternion{});
+  set.pose.turn = parse_turn(in).value_or(contact::Quaternion{});
   parse_friction(in, set.shape);
   c.change = std::move(set);
   return c;
 }
 
 What parse_instrument(Words& in) {
-  SetInstrument set;
+  scene::SetInstrument set;
   set.name = in.name();
   const std::string& kind = in.word("shape");
   if (kind == "mesh")
@@ -240,7 +241,7 @@ What parse_instrument(Words& in) {
 What parse_move(Words& in) {
   ChangeCommand c;
   c.instrument = in.name();
-  MoveInstrument move;
+  scene::MoveInstrument move;
   move.place = in.vector("number");
   move.turn = parse_turn(in);
   move.duration = in.time_after("over");
@@ -251,9 +252,9 @@ What parse_move(Words& in) {
 What parse_couple(Words& in) {
   ChangeCommand c;
   c.instrument = in.name();
-  SetCoupling set;
+  scene::SetCoupling set;
   if (!in.take("off")) {
-    Coupling coupling;
+    contact::Coupling coupling;
     coupling.stiffness = in.number("stiffness");
     if (!(coupling.stiffness > 0))
       in.fail("a stiffness that is not positive");
@@ -268,21 +269,21 @@ What parse_couple(Words& in) {
 }
 
 What parse_grasp(Words& in) {
-  ChangeCommand c = parse_about(in, Grasp{});
+  ChangeCommand c = parse_about(in, scene::Grasp{});
   c.instrument = in.name();
   return c;
 }
 
 What parse_withdraw(Words& in) {
-  return ChangeCommand{.change = Withdraw{}, .instrument = in.name()};
+  return ChangeCommand{.change = scene::Withdraw{}, .instrument = in.name()};
 }
 
 What parse_gravity(Words& in) {
-  return ChangeCommand{.change = SetGravity{in.vector("number")}};
+  return ChangeCommand{.change = scene::SetGravity{in.vector("number")}};
 }
 
 What parse_timestep(Words& in) {
-  const SetTimestep c{in.number("time")};
+  const scene::SetTimestep c{in.number("time")};
   if (!(c.dt > 0))
     in.fail("a timestep that is not positive");
   return ChangeCommand{.change = c};
@@ -291,7 +292,7 @@ What parse_timestep(Words& in) {
 What parse_two_step(Words& in) {
   ChangeCommand c;
   c.object = in.name();
-  SetTwoStep set;
+  scene::SetTwoStep set;
   set.options.threshold = in.number("force");
   if (!(set.options.threshold > 0))
     in.fail("a threshold that is not positive");
@@ -312,7 +313,7 @@ What parse_method(Words& in) {
   const std::string& word = in.word("method");
   if (word != "ffe" && word != "ela")
     in.fail(shown(word) + " is no method");
-  c.change = SetMethod{0, word == "ffe" ? Method::ffe : Method::ela};
+  c.change = scene::SetMethod{0, word == "ffe" ? scene::Method::ffe : scene::Method::ela};
   return c;
 }
 
@@ -321,7 +322,7 @@ What parse_cut(Words& in) {
   c.object = in.name();
   const std::string& kind = in.word("'springs' or 'plane'");
   if (kind == "plane") {
-    PlaneToCut what;
+    scene::PlaneToCut what;
     what.plane.point = in.vector("number");
     what.plane.normal = in.vector("number");
     const double size = norm(what.plane.normal);
@@ -332,12 +333,12 @@ What parse_cut(Words& in) {
       c.nodes = in.nodes();
       what.along_faces = in.take("along=faces");
     }
-    c.change = CutObject{0, what};
+    c.change = scene::CutObject{0, what};
   } else if (kind == "springs") {
     c.nodes = in.nodes();
     if (!in.done())
       c.others = in.nodes();
-    c.change = CutObject{};
+    c.change = scene::CutObject{};
   } else {
     in.fail(shown(kind) + " can't be cut");
   }
@@ -347,7 +348,7 @@ What parse_cut(Words& in) {
 What parse_tear(Words& in) {
   ChangeCommand c;
   c.object = in.name();
-  SetTear set;
+  scene::SetTear set;
   std::optional<std::string> of = in.take_after("strain=");
   if (!of) {
     of = in.take_after("stress=");
@@ -377,13 +378,13 @@ What parse_tear(Words& in) {
 }
 
 What parse_restore(Words& in) {
-  return ChangeCommand{.change = Restore{}, .object = in.name()};
+  return ChangeCommand{.change = scene::Restore{}, .object = in.name()};
 }
 
 What parse_prepare(Words& in) {
   ChangeCommand c;
   c.object = in.name();
-  Prepare prepare;
+  scene::Prepare prepare;
   if (in.take("contact")) {
     prepare.cut = false;
     if (!in.done())
@@ -485,7 +486,8 @@ What parse_command(std::vector<std::string> line, bool behind_at) {
     if (verb.at || !behind_at)
       known.emplace_back(verb.name);
   throw Error(shown(verb_name) + " is no command" + (behind_at ? " behind at T" : "") +
-              suggestion(verb_name, known) + ", expected one of " + verb_list(behind_at));
+              gewebe::text::suggestion(verb_name, known) + ", expected one of " +
+              verb_list(behind_at));
 }
 
 } // namespace
@@ -551,4 +553,4 @@ std::optional<Command> parse_scene_line(std::string_view line) {
   return command;
 }
 
-} // namespace gewebe
+} // namespace gewebe::formats

@@ -8,7 +8,7 @@
 #include <string_view>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::formats {
 
 /// The command of one line (without its end), or nothing if it is blank or a comment. Syntax alone:
 /// whether objects and files exist is for the run to find out.
@@ -20,4 +20,4 @@ std::optional<Command> parse_scene_line(std::string_view line);
 std::vector<std::string> scene_words(std::string_view line);
 std::string scene_line(const std::vector<std::string>& words);
 
-} // namespace gewebe
+} // namespace gewebe::formats

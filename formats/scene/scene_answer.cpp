@@ -8,7 +8,7 @@
 #include <charconv>
 #include <span>
 
-namespace gewebe {
+namespace gewebe::formats {
 
 namespace {
 
@@ -41,12 +41,12 @@ void append_numbers(std::string& line, const Vec3& v) {
 }
 
 std::string
-instrument_lines(const Simulation& simulation,
-                 const std::function<void(std::string&, const InstrumentReport&)>& tell) {
+instrument_lines(const scene::Simulation& simulation,
+                 const std::function<void(std::string&, const scene::InstrumentReport&)>& tell) {
   std::size_t count = 0;
   std::string lines;
   for (std::size_t k = 0; k < simulation.instrument_count(); ++k) {
-    const InstrumentReport report = simulation.instrument(k);
+    const scene::InstrumentReport report = simulation.instrument(k);
     if (!report.present)
       continue;
     ++count;
@@ -57,41 +57,41 @@ instrument_lines(const Simulation& simulation,
   return "instruments " + std::to_string(count) + "\n" + lines;
 }
 
-std::string cutting_line(const Simulation& simulation, const Cutting& c) {
+std::string cutting_line(const scene::Simulation& simulation, const scene::Cutting& c) {
   const std::string& name = simulation.object(c.object).name;
   const std::string nodes = " nodes " + std::to_string(c.nodes);
   switch (c.kind) {
-  case Cutting::Kind::cut:
+  case scene::Cutting::Kind::cut:
     return "cut " + name + " springs " + std::to_string(c.springs) + " doubled " +
            std::to_string(c.doubled) + nodes;
-  case Cutting::Kind::part:
+  case scene::Cutting::Kind::part:
     return "part " + name + " " + simulation.object(c.part).name + nodes;
-  case Cutting::Kind::loose:
+  case scene::Cutting::Kind::loose:
     return "loose " + name + nodes;
   default:
     return "restored " + name + nodes;
   }
 }
 
-bool topology_changed(const Simulation& simulation, std::size_t object) {
-  const std::vector<Cutting>& all = simulation.news().cuttings;
-  return std::any_of(all.begin(), all.end(), [&](const Cutting& c) {
-    return c.kind != Cutting::Kind::loose &&
-           (c.kind == Cutting::Kind::part ? c.part : c.object) == object;
+bool topology_changed(const scene::Simulation& simulation, std::size_t object) {
+  const std::vector<scene::Cutting>& all = simulation.news().cuttings;
+  return std::any_of(all.begin(), all.end(), [&](const scene::Cutting& c) {
+    return c.kind != scene::Cutting::Kind::loose &&
+           (c.kind == scene::Cutting::Kind::part ? c.part : c.object) == object;
   });
 }
 
-std::string text_answer(const Simulation& simulation, std::uint64_t step,
+std::string text_answer(const scene::Simulation& simulation, std::uint64_t step,
                         const AnswerFields& fields) {
   std::string text = "step " + std::to_string(step) + " ";
   append(text, simulation.time());
   text += '\n';
-  for (const MethodJump& jump : simulation.news().jumps) {
+  for (const scene::MethodJump& jump : simulation.news().jumps) {
     text += "jump " + simulation.object(jump.object).name + " ";
     append(text, jump.size);
     text += '\n';
   }
-  for (const Cutting& c : simulation.news().cuttings)
+  for (const scene::Cutting& c : simulation.news().cuttings)
     text += cutting_line(simulation, c) + "\n";
   for (std::size_t i = 0; simulation.settings().emits.any_shapes() && i < simulation.object_count();
        ++i) {
@@ -105,16 +105,16 @@ std::string text_answer(const Simulation& simulation, std::uint64_t step,
   }
   for (std::size_t i = 0; simulation.settings().emits.forces && i < simulation.object_count();
        ++i) {
-    const std::vector<NodeVector>& forces = simulation.contact_forces(i);
+    const std::vector<contact::NodeVector>& forces = simulation.contact_forces(i);
     text += "forces " + simulation.object(i).name + " " + std::to_string(forces.size()) + "\n";
-    for (const NodeVector& f : forces) {
+    for (const contact::NodeVector& f : forces) {
       text += std::to_string(f.node) + " ";
       append(text, f.value, '\n');
     }
   }
   for (std::size_t i = 0; simulation.settings().emits.any_shapes() && i < simulation.object_count();
        ++i) {
-    const std::vector<Node>& nodes = simulation.model(i).nodes;
+    const std::vector<model::Node>& nodes = simulation.model(i).nodes;
     const bool all = simulation.settings().emits.shapes;
     const std::size_t count = all ? nodes.size() : simulation.surface_nodes(i);
     const std::span<const double> u =
@@ -133,25 +133,26 @@ std::string text_answer(const Simulation& simulation, std::uint64_t step,
         append(text, value + 0.0); // -0 as 0
       }
       text += ' ';
-      append(text, von_mises(of.stress[node]));
+      append(text, fem::von_mises(of.stress[node]));
       text += '\n';
     }
   }
   for (const EstimateAnswer& of : fields.estimates) {
     text += "estimate " + simulation.object(of.object).name;
-    if (const std::optional<DiscretisationError>& e = of.error)
+    if (const std::optional<fem::DiscretisationError>& e = of.error)
       append_numbers(text, {e->relative, e->force, e->displacement, e->stress});
     else
       text += " none";
     text += '\n';
   }
   if (simulation.settings().emits.instruments)
-    text += instrument_lines(simulation, [](std::string& line, const InstrumentReport& report) {
-      for (const Vec3& v : {report.pose.place, report.force, report.torque})
-        append_numbers(line, v);
-      if (report.hand)
-        append_numbers(line, *report.hand);
-    });
+    text +=
+        instrument_lines(simulation, [](std::string& line, const scene::InstrumentReport& report) {
+          for (const Vec3& v : {report.pose.place, report.force, report.torque})
+            append_numbers(line, v);
+          if (report.hand)
+            append_numbers(line, *report.hand);
+        });
   return text + "done\n";
 }
 
@@ -159,13 +160,13 @@ std::string text_ok(std::uint64_t line) {
   return "ok " + std::to_string(line) + "\n";
 }
 
-std::string text_sync(const Simulation& simulation) {
+std::string text_sync(const scene::Simulation& simulation) {
   std::string text = "sync ";
   append(text, simulation.time());
   return text + "\n";
 }
 
-std::string text_ready(const Simulation& simulation) {
+std::string text_ready(const scene::Simulation& simulation) {
   std::string text = "ready ";
   append(text, simulation.time());
   return text + "\n";
@@ -176,7 +177,7 @@ std::string text_error(std::uint64_t line, std::string_view text) {
   std::string answer = "error " + std::to_string(line) + ": ";
   while (!text.empty()) {
     const auto first = static_cast<unsigned char>(text[0]);
-    const std::size_t size = utf8_size(text);
+    const std::size_t size = gewebe::text::utf8_size(text);
     if (size == 0)
       answer += '?';
     else if (first < 0x20 || first == 0x7f)
@@ -188,4 +189,4 @@ std::string text_error(std::uint64_t line, std::string_view text) {
   return answer + "\n";
 }
 
-} // namespace gewebe
+} // namespace gewebe::formats

@@ -5,12 +5,12 @@
 #include "model/selector.h"
 #include "scene/simulation.h"
 
-namespace gewebe {
+namespace gewebe::formats {
 
 /// The change with the numbers of what the command names; a new instrument gets its number.
 /// \throw Error if an object, instrument or node does not exist; what the object's model and
 /// `lists` throw
-Change scene_change(const ChangeCommand& command, const Simulation& simulation,
-                    const LoadNodeList& lists);
+scene::Change scene_change(const ChangeCommand& command, const scene::Simulation& simulation,
+                           const model::LoadNodeList& lists);
 
-} // namespace gewebe
+} // namespace gewebe::formats

@@ -10,13 +10,13 @@
 #include <span>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::formats {
 
 namespace {
 
-std::string told_nodes(const Simulation& simulation, const QueryCommand& query) {
-  const std::size_t object = find_object(simulation, query.object);
-  const std::vector<Node>& nodes = simulation.model(object).nodes;
+std::string told_nodes(const scene::Simulation& simulation, const QueryCommand& query) {
+  const std::size_t object = scene::find_object(simulation, query.object);
+  const std::vector<model::Node>& nodes = simulation.model(object).nodes;
   std::string text = "nodes " + query.object + " " + std::to_string(nodes.size()) + "\n";
   if (query.positions == QueryCommand::Positions::none)
     return text;
@@ -28,15 +28,16 @@ std::string told_nodes(const Simulation& simulation, const QueryCommand& query) 
   const std::span<const double> u = now ? simulation.displacement(object) : std::span<double>();
   for (std::size_t k = 0; k < nodes.size(); ++k) {
     const Vec3 p = now ? nodes[k].position + vector_at(u, k) : nodes[k].position;
-    text += number_text(p.x) + ' ' + number_text(p.y) + ' ' + number_text(p.z) + '\n';
+    text += gewebe::text::number_text(p.x) + ' ' + gewebe::text::number_text(p.y) + ' ' +
+            gewebe::text::number_text(p.z) + '\n';
   }
   return text;
 }
 
-std::string told_selection(const Simulation& simulation, const QueryCommand& query,
-                           const LoadNodeList& lists) {
-  const std::size_t object = find_object(simulation, query.object);
-  const std::vector<std::uint32_t> nodes = select_nodes(
+std::string told_selection(const scene::Simulation& simulation, const QueryCommand& query,
+                           const model::LoadNodeList& lists) {
+  const std::size_t object = scene::find_object(simulation, query.object);
+  const std::vector<std::uint32_t> nodes = model::select_nodes(
       simulation.model(object), simulation.node_counts(object), query.nodes.value(), lists);
   std::string text = "select " + query.object + " " + std::to_string(nodes.size()) + "\n";
   for (const std::uint32_t node : nodes)
@@ -44,29 +45,29 @@ std::string told_selection(const Simulation& simulation, const QueryCommand& que
   return text;
 }
 
-std::string told_objects(const Simulation& simulation) {
+std::string told_objects(const scene::Simulation& simulation) {
   std::string text = "objects " + std::to_string(simulation.object_count()) + "\n";
   for (std::size_t i = 0; i < simulation.object_count(); ++i) {
-    const ObjectFacts object = simulation.object(i);
-    text += object.name + ' ' + method_name(object.method);
+    const scene::ObjectFacts object = simulation.object(i);
+    text += object.name + ' ' + scene::method_name(object.method);
     if (object.known) { // its file is not read for this
-      const Model& model = simulation.model(i);
+      const model::Model& model = simulation.model(i);
       for (const std::size_t count :
            {model.nodes.size(), model.triangles.size(), model.tetrahedra.size()})
         text += ' ' + std::to_string(count);
     } else {
       text += " - - -";
     }
-    text += object.method == Method::ffe ? " -\n" : object.awake ? " awake\n" : " asleep\n";
+    text += object.method == scene::Method::ffe ? " -\n" : object.awake ? " awake\n" : " asleep\n";
   }
   return text;
 }
 
-std::string told_instruments(const Simulation& simulation) {
-  return instrument_lines(simulation, [](std::string& line, const InstrumentReport& report) {
-    const InstrumentShape& shape = report.shape;
-    (line += ' ') += instrument_kind_name(kind_of(shape));
-    const Quaternion& turn = report.pose.turn;
+std::string told_instruments(const scene::Simulation& simulation) {
+  return instrument_lines(simulation, [](std::string& line, const scene::InstrumentReport& report) {
+    const contact::InstrumentShape& shape = report.shape;
+    (line += ' ') += contact::instrument_kind_name(contact::kind_of(shape));
+    const contact::Quaternion& turn = report.pose.turn;
     append_numbers(line, {shape.radius, shape.friction});
     append_numbers(line, report.pose.place);
     append_numbers(line, report.pose(shape.axis));
@@ -83,8 +84,8 @@ std::string told_instruments(const Simulation& simulation) {
 
 } // namespace
 
-std::string text_query(const Simulation& simulation, const QueryCommand& query,
-                       const LoadNodeList& lists) {
+std::string text_query(const scene::Simulation& simulation, const QueryCommand& query,
+                       const model::LoadNodeList& lists) {
   switch (query.kind) {
   case QueryCommand::Kind::nodes:
     return told_nodes(simulation, query);
@@ -98,4 +99,4 @@ std::string text_query(const Simulation& simulation, const QueryCommand& query,
   return told_instruments(simulation);
 }
 
-} // namespace gewebe
+} // namespace gewebe::formats

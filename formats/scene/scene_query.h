@@ -7,12 +7,12 @@
 
 #include <string>
 
-namespace gewebe {
+namespace gewebe::formats {
 
 /// The lines of the answer. A model that was not needed before is read for nodes and select;
 /// nothing else changes. \throw Error if there is no such object, its shape was not computed or the
 /// selector names nothing; what the object's model and `lists` throw
-std::string text_query(const Simulation& simulation, const QueryCommand& query,
-                       const LoadNodeList& lists);
+std::string text_query(const scene::Simulation& simulation, const QueryCommand& query,
+                       const model::LoadNodeList& lists);
 
-} // namespace gewebe
+} // namespace gewebe::formats

@@ -3,7 +3,7 @@
 #include <string>
 #include <utility>
 
-namespace gewebe {
+namespace gewebe::formats {
 
 What parse_emit(Words& in) {
   const std::string& word = in.word("word");
@@ -24,7 +24,8 @@ What parse_emit(Words& in) {
   }
   if (word != "shapes" && word != "surfaces" && word != "forces" && word != "instruments")
     in.fail(shown(word) + " can't be emitted");
-  return ChangeCommand{.change = Emit{word == "forces", word == "instruments", word == "surfaces"}};
+  return ChangeCommand{
+      .change = scene::Emit{word == "forces", word == "instruments", word == "surfaces"}};
 }
 
 What parse_step(Words& in) {
@@ -79,4 +80,4 @@ What parse_instruments(Words&) {
   return QueryCommand{.kind = QueryCommand::Kind::instruments};
 }
 
-} // namespace gewebe
+} // namespace gewebe::formats

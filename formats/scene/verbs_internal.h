@@ -4,7 +4,7 @@
 #include "formats/scene/command.h"
 #include "formats/scene/words.h"
 
-namespace gewebe {
+namespace gewebe::formats {
 
 using What = decltype(Command::what);
 
@@ -18,4 +18,4 @@ What parse_select(Words& in);
 What parse_objects(Words& in);
 What parse_instruments(Words& in);
 
-} // namespace gewebe
+} // namespace gewebe::formats

@@ -7,7 +7,7 @@
 #include <charconv>
 #include <cmath>
 
-namespace gewebe {
+namespace gewebe::formats {
 
 std::string shown(std::string_view word) {
   std::string text = "'";
@@ -39,7 +39,7 @@ double Words::number(const char* what) {
 }
 
 double Words::number_in(std::string_view text, const char* what) const {
-  const std::string_view digits = without_plus(text);
+  const std::string_view digits = gewebe::text::without_plus(text);
   const char* const end = digits.data() + digits.size();
   double value = 0;
   const auto [rest, status] = std::from_chars(digits.data(), end, value);
@@ -91,8 +91,8 @@ Words Words::rest(const char* usage) const {
   return {{words_.begin() + static_cast<std::ptrdiff_t>(at_), words_.end()}, usage};
 }
 
-Selector Words::nodes() {
-  return parse_selector(word("NODES"));
+model::Selector Words::nodes() {
+  return model::parse_selector(word("NODES"));
 }
 
-} // namespace gewebe
+} // namespace gewebe::formats

@@ -11,7 +11,7 @@
 #include <utility>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::formats {
 
 /// A word as a message may show it: short, printable.
 std::string shown(std::string_view word);
@@ -39,7 +39,7 @@ public:
   std::string name();
   /// The number behind `word`, which may be absent: 0. \throw Error unless positive
   double time_after(std::string_view word);
-  Selector nodes();
+  model::Selector nodes();
   /// \throw Error if a word is left
   void end() const;
   [[noreturn]] void fail(const std::string& what) const;
@@ -52,4 +52,4 @@ private:
   std::size_t at_ = 0;
 };
 
-} // namespace gewebe
+} // namespace gewebe::formats

@@ -19,7 +19,7 @@
 #include <unistd.h>
 #include <vector>
 
-namespace gewebe::hdf5 {
+namespace gewebe::formats::hdf5 {
 
 static_assert(std::endian::native == std::endian::little);
 
@@ -595,4 +595,4 @@ int restore_checkpoint(const std::string& path) {
   return error;
 }
 
-} // namespace gewebe::hdf5
+} // namespace gewebe::formats::hdf5

@@ -17,7 +17,7 @@
 #include <cstdint>
 #include <string>
 
-namespace gewebe::hdf5 {
+namespace gewebe::formats::hdf5 {
 
 /// Properties of a file access (H5P_FILE_ACCESS) get this driver. \return false if HDF5 refuses
 bool use_checkpoints(std::int64_t access);
@@ -33,4 +33,4 @@ void discard_writes(std::int64_t file);
 /// \return 0, or the errno of what failed
 int restore_checkpoint(const std::string& path);
 
-} // namespace gewebe::hdf5
+} // namespace gewebe::formats::hdf5

@@ -12,7 +12,7 @@
 #include <unistd.h>
 #include <utility>
 
-namespace gewebe {
+namespace gewebe::formats {
 
 namespace {
 
@@ -187,4 +187,4 @@ void ColumnJournal::remove() {
   (void)::unlink(path_.c_str());
 }
 
-} // namespace gewebe
+} // namespace gewebe::formats

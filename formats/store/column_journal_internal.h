@@ -18,7 +18,7 @@
 #include <string>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::formats {
 
 struct ColumnRecord {
   std::uint32_t crc = 0;
@@ -67,4 +67,4 @@ private:
   std::size_t object_ = 0;         ///< the next one
 };
 
-} // namespace gewebe
+} // namespace gewebe::formats

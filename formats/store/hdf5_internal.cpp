@@ -15,7 +15,7 @@
 #include <limits>
 #include <sys/stat.h>
 
-namespace gewebe::hdf5 {
+namespace gewebe::formats::hdf5 {
 
 static_assert(std::is_same_v<hid_t, std::int64_t>);
 
@@ -739,4 +739,4 @@ void File::close() {
     throw Error(file_->path, "cannot write" + (file_->failed ? file_->reason : system_reason()));
 }
 
-} // namespace gewebe::hdf5
+} // namespace gewebe::formats::hdf5

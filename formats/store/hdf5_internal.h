@@ -15,7 +15,7 @@
 #include <utility>
 #include <vector>
 
-namespace gewebe::hdf5 {
+namespace gewebe::formats::hdf5 {
 
 enum class Number : std::uint8_t { float64, float32, int64, uint64, int32, uint32, uint8 };
 
@@ -289,4 +289,4 @@ private:
   std::unique_ptr<Group> root_;
 };
 
-} // namespace gewebe::hdf5
+} // namespace gewebe::formats::hdf5

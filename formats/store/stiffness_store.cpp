@@ -11,7 +11,7 @@
 #include <cmath>
 #include <optional>
 
-namespace gewebe {
+namespace gewebe::formats {
 
 namespace {
 
@@ -109,7 +109,7 @@ StiffnessFacts read_facts(const hdf5::Group& root, const std::string& name) {
   return facts;
 }
 
-void check_matrix(const hdf5::Group& group, const StiffnessMatrix& matrix) {
+void check_matrix(const hdf5::Group& group, const linalg::StiffnessMatrix& matrix) {
   const auto order = static_cast<std::int64_t>(matrix.order());
   require(group,
           matrix.column_start.front() == 0 &&
@@ -136,17 +136,17 @@ void check_matrix(const hdf5::Group& group, const StiffnessMatrix& matrix) {
 
 } // namespace
 
-std::uint64_t stiffness_hash(const Model& model) {
+std::uint64_t stiffness_hash(const model::Model& model) {
   Digest digest;
   const auto add_values = [&](auto... value) {
     const double values[]{static_cast<double>(value)...};
     digest.add_bytes(values, sizeof values);
   };
   digest.add(static_cast<std::uint64_t>(model.nodes.size()));
-  for (const Node& n : model.nodes)
+  for (const model::Node& n : model.nodes)
     add_values(n.position.x, n.position.y, n.position.z, n.mass, n.fixed);
   digest.add(static_cast<std::uint64_t>(model.springs.size()));
-  for (const Spring& s : model.springs)
+  for (const model::Spring& s : model.springs)
     add_values(s.i, s.j, s.stiffness, s.rest);
   if (!model.tetrahedra.empty()) { // else the hash of springs stays what it was
     digest.add(static_cast<std::uint64_t>(model.tetrahedra.size()));
@@ -154,16 +154,16 @@ std::uint64_t stiffness_hash(const Model& model) {
     digest.add(static_cast<std::uint64_t>(model.middles.size()));
     digest.add(model.middles);
     for (const std::int32_t number : model.tetrahedron_material) {
-      const Material& m = model.materials[static_cast<std::size_t>(number)];
+      const model::Material& m = model.materials[static_cast<std::size_t>(number)];
       add_values(m.young, m.poisson.value_or(-1), m.density);
     }
   }
   return digest.value();
 }
 
-std::uint64_t rest_hash(const Model& model) {
+std::uint64_t rest_hash(const model::Model& model) {
   Digest digest;
-  for (const Node& n : model.nodes) {
+  for (const model::Node& n : model.nodes) {
     const double values[]{n.position.x, n.position.y, n.position.z, static_cast<double>(n.fixed)};
     digest.add_bytes(values, sizeof values);
   }
@@ -210,7 +210,7 @@ StiffnessFacts StiffnessStore::facts(const std::string& group) const {
   return read_facts(state_->file.root(), group);
 }
 
-StiffnessFacts StiffnessStore::facts(const Model& model) const {
+StiffnessFacts StiffnessStore::facts(const model::Model& model) const {
   const std::uint64_t hash = stiffness_hash(model);
   std::string names;
   for (const std::string& name : objects()) {
@@ -257,9 +257,9 @@ StiffnessSizes StiffnessStore::sizes(const StiffnessFacts& facts) const {
   return sizes;
 }
 
-StiffnessMatrix StiffnessStore::matrix(const StiffnessFacts& facts) const {
+linalg::StiffnessMatrix StiffnessStore::matrix(const StiffnessFacts& facts) const {
   const hdf5::Group group = group_of(state_->file.root(), facts.group).group("K");
-  StiffnessMatrix matrix;
+  linalg::StiffnessMatrix matrix;
   matrix.axis_of_row = read_places(group, "axis", facts.order);
   matrix.column_start = read_places(group, "p", facts.order + 1);
   matrix.row = read_places(group, "i");
@@ -276,9 +276,9 @@ StiffnessMatrix StiffnessStore::matrix(const StiffnessFacts& facts) const {
   return matrix;
 }
 
-Factor StiffnessStore::factor(const StiffnessFacts& facts) const {
+linalg::Factor StiffnessStore::factor(const StiffnessFacts& facts) const {
   const hdf5::Group group = group_of(state_->file.root(), facts.group).group("L");
-  FactorData data;
+  linalg::FactorData data;
   data.order = static_cast<std::int64_t>(facts.order);
   data.max_column_size = group.number<std::int64_t>("maxcsize");
   data.max_row_size = group.number<std::int64_t>("maxesize");
@@ -289,13 +289,13 @@ Factor StiffnessStore::factor(const StiffnessFacts& facts) const {
   data.px = read_places(group, "px", data.super.size());
   data.s = read_places(group, "s");
   data.x = read_checked<double>(group, "x");
-  return at(path(), [&] { return Factor(std::move(data)); });
+  return gewebe::at(path(), [&] { return linalg::Factor(std::move(data)); });
 }
 
 namespace {
 
 /// Columns that stay in the file; `keep` keeps it open.
-class StoredColumns final : public ColumnSource {
+class StoredColumns final : public columns::ColumnSource {
 public:
   StoredColumns(std::shared_ptr<const void> keep, const hdf5::Group& group,
                 const StiffnessFacts& facts)
@@ -342,8 +342,8 @@ private:
 };
 
 /// Of a group of compressed columns.
-CompressedLayout read_layout(const hdf5::Group& group, const StiffnessFacts& facts) {
-  CompressedLayout layout;
+columns::CompressedLayout read_layout(const hdf5::Group& group, const StiffnessFacts& facts) {
+  columns::CompressedLayout layout;
   layout.relative = facts.compressed;
   layout.bound = group.number<double>("bound");
   layout.clusters.node = read_checked<std::uint32_t>(group, "order", rows_of(facts));
@@ -354,7 +354,7 @@ CompressedLayout read_layout(const hdf5::Group& group, const StiffnessFacts& fac
   for (std::size_t k = 0; k < counts.size(); k += 2)
     layout.count.push_back({counts[k], counts[k + 1]});
   try {
-    check_layout(layout, rows_of(facts));
+    columns::check_layout(layout, rows_of(facts));
   } catch (const Error& error) {
     group.fail(std::string("is damaged: ") + error.what());
   }
@@ -368,8 +368,8 @@ CompressedLayout read_layout(const hdf5::Group& group, const StiffnessFacts& fac
 class ChunkFile {
 public:
   ChunkFile(std::shared_ptr<const void> keep, const hdf5::Group& group,
-            const CompressedLayout& layout)
-      : keep_(std::move(keep)), size_(chunk_sizes(layout)),
+            const columns::CompressedLayout& layout)
+      : keep_(std::move(keep)), size_(columns::chunk_sizes(layout)),
         crc_(read_checked<std::uint32_t>(group, "crc32c", size_.size())),
         values_(group.dataset("values", hdf5::Number::uint8)) {
     std::uint64_t end = 0;
@@ -399,13 +399,13 @@ private:
 
 } // namespace
 
-std::unique_ptr<ColumnSource> StiffnessStore::columns(const StiffnessFacts& facts) const {
+std::unique_ptr<columns::ColumnSource> StiffnessStore::columns(const StiffnessFacts& facts) const {
   const hdf5::Group object = group_of(state_->file.root(), facts.group);
   if (object.has(store::compressed)) {
     const hdf5::Group group = object.group(store::compressed);
-    CompressedLayout layout = read_layout(group, facts);
+    columns::CompressedLayout layout = read_layout(group, facts);
     const auto file = std::make_shared<const ChunkFile>(state_, group, layout);
-    return std::make_unique<CompressedColumns>(
+    return std::make_unique<columns::CompressedColumns>(
         std::move(layout), facts.nodes, [file](std::size_t chunk) { return file->read(chunk); });
   }
   if (!object.has("columns"))
@@ -413,4 +413,4 @@ std::unique_ptr<ColumnSource> StiffnessStore::columns(const StiffnessFacts& fact
   return std::make_unique<StoredColumns>(state_, object.group("columns"), facts);
 }
 
-} // namespace gewebe
+} // namespace gewebe::formats

@@ -13,7 +13,7 @@
 #include <string>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::formats {
 
 /// How columns were computed.
 struct StiffnessMethod {
@@ -64,10 +64,10 @@ struct StiffnessSizes {
 /// XXH3-64 of what K and gravity depend on: rest positions, masses and constraints of the nodes,
 /// stiffness and rest length of the springs, nodes and elasticity and density of the tetrahedra.
 /// Neither names nor damping count.
-std::uint64_t stiffness_hash(const Model& model);
+std::uint64_t stiffness_hash(const model::Model& model);
 
 /// XXH3-64 of rest positions and constraints of the nodes: what the two stages of an object share.
-std::uint64_t rest_hash(const Model& model);
+std::uint64_t rest_hash(const model::Model& model);
 
 /// Where a store keeps the second stage of an object: OBJECT/stage2.
 std::string second_stage_group(const std::string& group);
@@ -90,22 +90,22 @@ public:
   /// \throw Error if there is no such group, or what it says contradicts itself
   StiffnessFacts facts(const std::string& group) const;
   /// The object that belongs to this model, by hash. \throw Error "is of another model …"
-  StiffnessFacts facts(const Model& model) const;
+  StiffnessFacts facts(const model::Model& model) const;
   /// The second matrix of an object, stored with it, for the two-step method; or nothing.
   std::optional<StiffnessFacts> second_stage(const StiffnessFacts& facts) const;
   StoreShard shard() const;
   StiffnessSizes sizes(const StiffnessFacts& facts) const;
   /// The matrix itself. \throw Error if it is damaged
-  StiffnessMatrix matrix(const StiffnessFacts& facts) const;
+  linalg::StiffnessMatrix matrix(const StiffnessFacts& facts) const;
   /// Its order is facts.order. \throw Error if it is damaged
-  Factor factor(const StiffnessFacts& facts) const;
+  linalg::Factor factor(const StiffnessFacts& facts) const;
   /// Null where the object has none. They may outlive the store. Those that are compressed are read
   /// chunk by chunk. \throw Error if they are damaged
-  std::unique_ptr<ColumnSource> columns(const StiffnessFacts& facts) const;
+  std::unique_ptr<columns::ColumnSource> columns(const StiffnessFacts& facts) const;
 
 private:
   struct State;
   std::shared_ptr<State> state_;
 };
 
-} // namespace gewebe
+} // namespace gewebe::formats

@@ -4,7 +4,7 @@
 #include <cstddef>
 #include <cstdint>
 
-namespace gewebe::store {
+namespace gewebe::formats::store {
 
 inline constexpr const char* format = "gewebe stiffness store";
 inline constexpr std::int64_t version = 1;
@@ -19,4 +19,4 @@ inline std::uint64_t bound_blocks(std::uint64_t nodes) {
   return nodes / bound_nodes + (nodes % bound_nodes != 0 ? 1 : 0);
 }
 
-} // namespace gewebe::store
+} // namespace gewebe::formats::store

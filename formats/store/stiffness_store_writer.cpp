@@ -16,7 +16,7 @@
 #include <limits>
 #include <optional>
 
-namespace gewebe {
+namespace gewebe::formats {
 
 namespace {
 
@@ -42,7 +42,7 @@ void write_places(hdf5::Group& group, const std::string& name,
   write_checked<std::uint32_t>(group, name, narrow);
 }
 
-void write_matrix(hdf5::Group& object, const StiffnessMatrix& matrix) {
+void write_matrix(hdf5::Group& object, const linalg::StiffnessMatrix& matrix) {
   hdf5::Group group = object.create_group("K");
   write_places(group, "axis", matrix.axis_of_row);
   write_places(group, "p", matrix.column_start);
@@ -50,7 +50,7 @@ void write_matrix(hdf5::Group& object, const StiffnessMatrix& matrix) {
   write_checked<double>(group, "x", matrix.value);
 }
 
-void write_factor(hdf5::Group& object, const FactorView& l) {
+void write_factor(hdf5::Group& object, const linalg::FactorView& l) {
   hdf5::Group group = object.create_group("L");
   group.set("maxcsize", l.max_column_size);
   group.set("maxesize", l.max_row_size);
@@ -63,14 +63,14 @@ void write_factor(hdf5::Group& object, const FactorView& l) {
   write_checked(group, "x", l.x);
 }
 
-void add_matrix(Digest& digest, const StiffnessMatrix& matrix) {
+void add_matrix(Digest& digest, const linalg::StiffnessMatrix& matrix) {
   digest.add(matrix.axis_of_row);
   digest.add(matrix.column_start);
   digest.add(matrix.row);
   digest.add(matrix.value);
 }
 
-void add_factor(Digest& digest, const FactorView& l) {
+void add_factor(Digest& digest, const linalg::FactorView& l) {
   for (const auto list : {l.permutation, l.column_count, l.super, l.pi, l.px, l.s})
     digest.add(list);
   digest.add(l.x);
@@ -101,9 +101,9 @@ double stored_columns_bytes(std::size_t nodes, std::size_t row_nodes, bool singl
           4.0 * static_cast<double>(store::bound_blocks(row_nodes)));
 }
 
-double stiffness_store_bytes(const StiffnessMatrix& matrix, const Factor& factor, std::size_t nodes,
-                             bool single, std::size_t row_nodes) {
-  const FactorView l = factor.view();
+double stiffness_store_bytes(const linalg::StiffnessMatrix& matrix, const linalg::Factor& factor,
+                             std::size_t nodes, bool single, std::size_t row_nodes) {
+  const linalg::FactorView l = factor.view();
   const double columns =
       stored_columns_bytes(nodes, std::min(row_nodes, matrix.row_of_axis.size() / 3), single);
   return 8 * (2 * static_cast<double>(matrix.order()) + 2 * static_cast<double>(matrix.row.size()) +
@@ -135,8 +135,8 @@ void add_facts(hdf5::Group& object, const StiffnessFacts& facts) {
 }
 
 /// Of all that columns depend on, beside the model.
-std::uint64_t work_digest(const StiffnessFacts& facts, const StiffnessMatrix& matrix,
-                          const Factor& factor, std::span<const std::uint32_t> nodes) {
+std::uint64_t work_digest(const StiffnessFacts& facts, const linalg::StiffnessMatrix& matrix,
+                          const linalg::Factor& factor, std::span<const std::uint32_t> nodes) {
   Digest digest;
   add_matrix(digest, matrix);
   add_factor(digest, factor.view());
@@ -331,8 +331,8 @@ hdf5::Group create_object(hdf5::File& file, const std::string& group) {
 } // namespace
 
 std::vector<std::uint32_t> StiffnessStoreWriter::begin(const StiffnessFacts& facts,
-                                                       const StiffnessMatrix& matrix,
-                                                       const Factor& factor,
+                                                       const linalg::StiffnessMatrix& matrix,
+                                                       const linalg::Factor& factor,
                                                        std::span<const std::uint32_t> nodes) {
   State& s = *state_;
   const bool plain = !nodes.empty() && facts.compressed == 0;
@@ -349,7 +349,7 @@ std::vector<std::uint32_t> StiffnessStoreWriter::begin(const StiffnessFacts& fac
   write_matrix(*s.object, matrix);
   add_factor(s.digest, factor.view());
   write_factor(*s.object, factor.view());
-  s.together = facts.method.name == "direct" ? compliance_block : 1;
+  s.together = facts.method.name == "direct" ? columns::compliance_block : 1;
   s.missing.clear();
   s.damaged.clear();
   s.sums.resize(plain ? nodes.size() : 0, rows);
@@ -387,9 +387,9 @@ void StiffnessStoreWriter::write(std::size_t k, std::span<const double> columns,
   s.write(s.missing[k], std::span<const float>(s.row), residual);
 }
 
-void StiffnessStoreWriter::write_compressed(const CompressedMade& columns) {
+void StiffnessStoreWriter::write_compressed(const columns::CompressedMade& columns) {
   State& s = *state_;
-  const CompressedLayout& layout = columns.layout;
+  const columns::CompressedLayout& layout = columns.layout;
   hdf5::Group group = s.object->create_group(store::compressed);
   group.set("relative", layout.relative);
   group.set("bound", layout.bound);
@@ -398,7 +398,7 @@ void StiffnessStoreWriter::write_compressed(const CompressedMade& columns) {
   write_checked<std::uint32_t>(group, "order", layout.clusters.node);
   write_checked<std::uint32_t>(group, "first", layout.clusters.first);
   std::vector<std::uint32_t> counts, crc;
-  for (const CrossCount& count : layout.count) {
+  for (const columns::CrossCount& count : layout.count) {
     counts.push_back(count.wide);
     counts.push_back(count.narrow);
   }
@@ -471,4 +471,4 @@ std::uint64_t StiffnessStoreWriter::matrix_digest() const {
   return state_->matrix_digest.value();
 }
 
-} // namespace gewebe
+} // namespace gewebe::formats

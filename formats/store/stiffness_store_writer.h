@@ -14,15 +14,15 @@
 #include <span>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::formats {
 
 /// Bytes of the columns of so many nodes with rows for `row_nodes`, and of their bounds.
 double stored_columns_bytes(std::size_t nodes, std::size_t row_nodes, bool single);
 
 /// Bytes of a store: what its arrays take. `nodes` columns are requested, with rows for the first
 /// `row_nodes` nodes, or for all if there are fewer.
-double stiffness_store_bytes(const StiffnessMatrix& matrix, const Factor& factor, std::size_t nodes,
-                             bool single, std::size_t row_nodes = SIZE_MAX);
+double stiffness_store_bytes(const linalg::StiffnessMatrix& matrix, const linalg::Factor& factor,
+                             std::size_t nodes, bool single, std::size_t row_nodes = SIZE_MAX);
 
 /// Writes a store, object by object: matrix and factor at once, columns as they come.
 ///
@@ -31,7 +31,7 @@ double stiffness_store_bytes(const StiffnessMatrix& matrix, const Factor& factor
 /// FILE.part.log says which. A writer that meets them takes up those whose checksums hold; all else
 /// is made again in a nameless file beside, and copied to FILE.part by `close`, so that a store
 /// made in several goes has the bytes of one made in one.
-class StiffnessStoreWriter final : public ColumnSink {
+class StiffnessStoreWriter final : public columns::ColumnSink {
 public:
   /// `output`, which must outlive this, is committed by the caller after `close`.
   /// \throw Error, place = name of the output, if that is no file or can't be written; place = its
@@ -45,13 +45,15 @@ public:
   /// whose columns are still to come: all, or what FILE.part doesn't hold. \throw Error too if the
   /// disk has no room, the group is there already, or FILE.part is of another model or was begun
   /// with other options
-  std::vector<std::uint32_t> begin(const StiffnessFacts& facts, const StiffnessMatrix& matrix,
-                                   const Factor& factor, std::span<const std::uint32_t> nodes);
+  std::vector<std::uint32_t> begin(const StiffnessFacts& facts,
+                                   const linalg::StiffnessMatrix& matrix,
+                                   const linalg::Factor& factor,
+                                   std::span<const std::uint32_t> nodes);
   /// k counts what begin() returned. \throw Error too if a number doesn't fit float32
   void write(std::size_t k, std::span<const double> columns, double residual) override;
   /// Columns of an object for which facts.compressed was set. Neither FILE.part nor its journal
   /// know of them.
-  void write_compressed(const CompressedMade& columns);
+  void write_compressed(const columns::CompressedMade& columns);
   /// After an object's last column; `residual` is the largest backward error of all other checks
   /// made. Returns the largest of all.
   double end(double residual);
@@ -75,4 +77,4 @@ private:
   std::unique_ptr<State> state_;
 };
 
-} // namespace gewebe
+} // namespace gewebe::formats

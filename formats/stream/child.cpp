@@ -20,7 +20,7 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
-namespace gewebe {
+namespace gewebe::formats {
 namespace {
 
 // What the child sends: this head, then `size` bytes.
@@ -252,4 +252,4 @@ std::string run_in_child(const std::function<std::string()>& work, const ChildLi
   return std::move(received.body());
 }
 
-} // namespace gewebe
+} // namespace gewebe::formats

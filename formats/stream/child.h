@@ -5,7 +5,7 @@
 #include <functional>
 #include <string>
 
-namespace gewebe {
+namespace gewebe::formats {
 
 struct ChildLimits {
   std::uint64_t memory = 0;  ///< bytes of address space beyond what this process has; 0: no limit
@@ -23,4 +23,4 @@ bool has_room_for_child(const ChildLimits& limits);
 /// how it ended: "out of memory", "took over 10 s", "crashed (signal 11)"
 std::string run_in_child(const std::function<std::string()>& work, const ChildLimits& limits);
 
-} // namespace gewebe
+} // namespace gewebe::formats

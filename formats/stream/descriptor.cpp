@@ -5,7 +5,7 @@
 #include <sys/file.h>
 #include <unistd.h>
 
-namespace gewebe {
+namespace gewebe::formats {
 
 Descriptor::~Descriptor() {
   if (fd_ >= 0)
@@ -26,4 +26,4 @@ Descriptor lock_folder_of(const std::string& path) {
   return lock;
 }
 
-} // namespace gewebe
+} // namespace gewebe::formats

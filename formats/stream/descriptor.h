@@ -4,7 +4,7 @@
 #include <string>
 #include <utility>
 
-namespace gewebe {
+namespace gewebe::formats {
 
 /// A file descriptor that is closed at the end.
 class Descriptor {
@@ -27,4 +27,4 @@ private:
 /// a name there. Empty for a folder that can't be read.
 Descriptor lock_folder_of(const std::string& path);
 
-} // namespace gewebe
+} // namespace gewebe::formats

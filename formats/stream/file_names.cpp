@@ -15,7 +15,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-namespace gewebe {
+namespace gewebe::formats {
 namespace {
 
 struct Identity {
@@ -197,4 +197,4 @@ std::string follow_links(std::string path) {
   return path;
 }
 
-} // namespace gewebe
+} // namespace gewebe::formats

@@ -10,7 +10,7 @@
 #include <string_view>
 #include <utility>
 
-namespace gewebe {
+namespace gewebe::formats {
 
 /// From now on FileUse and `note_read` look for clashes. For programs only, before they open
 /// anything.
@@ -55,4 +55,4 @@ std::string partial_name(const std::string& path);
 /// or with `..` in it.
 bool leaves_folder(std::string_view path);
 
-} // namespace gewebe
+} // namespace gewebe::formats

@@ -7,7 +7,7 @@
 #include <cctype>
 #include <utility>
 
-namespace gewebe {
+namespace gewebe::formats {
 namespace {
 
 constexpr std::array<std::pair<Kind, std::string_view>, 34> names{{
@@ -223,4 +223,4 @@ bool is_binary(Kind kind) {
          kind != Kind::inp && kind != Kind::feb && kind != Kind::svg && kind != Kind::ascii;
 }
 
-} // namespace gewebe
+} // namespace gewebe::formats

@@ -5,7 +5,7 @@
 #include <string_view>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::formats {
 
 enum class Kind {
   unknown,
@@ -66,4 +66,4 @@ Kind output_kind(std::string_view to, std::string_view path, Kind fallback,
                  const std::vector<Kind>& writable);
 bool is_binary(Kind kind);
 
-} // namespace gewebe
+} // namespace gewebe::formats

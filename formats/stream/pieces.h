@@ -9,7 +9,7 @@
 #include <string_view>
 #include <type_traits>
 
-namespace gewebe {
+namespace gewebe::formats {
 
 /// Where they go.
 using Sink = std::function<void(std::string_view)>;
@@ -50,4 +50,4 @@ private:
   std::string bytes_;
 };
 
-} // namespace gewebe
+} // namespace gewebe::formats

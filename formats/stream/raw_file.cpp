@@ -9,7 +9,7 @@
 #include <unistd.h>
 #include <utility>
 
-namespace gewebe {
+namespace gewebe::formats {
 
 RawFile::RawFile(const std::string& path, std::string name)
     : fd_(::open(path.c_str(), O_RDWR | O_NOFOLLOW | O_CLOEXEC)), name_(std::move(name)) {
@@ -88,4 +88,4 @@ void RawFile::resize(std::uint64_t size) {
     fail("cannot write");
 }
 
-} // namespace gewebe
+} // namespace gewebe::formats

@@ -6,7 +6,7 @@
 #include <string>
 #include <utility>
 
-namespace gewebe {
+namespace gewebe::formats {
 
 class RawFile {
 public:
@@ -40,4 +40,4 @@ private:
   std::string name_;
 };
 
-} // namespace gewebe
+} // namespace gewebe::formats

@@ -14,7 +14,7 @@
 #include <fcntl.h>
 #include <unistd.h>
 
-namespace gewebe {
+namespace gewebe::formats {
 
 namespace {
 
@@ -124,4 +124,4 @@ void remove_temporaries() noexcept {
       (void)::unlink(slot.path.data());
 }
 
-} // namespace gewebe
+} // namespace gewebe::formats

@@ -3,7 +3,7 @@
 
 #include <string>
 
-namespace gewebe {
+namespace gewebe::formats {
 
 /// From now on signals (those of install_signal_cleanup) and remove_temporaries() remove this file.
 /// \return a number for forget_removal; -1 if too many names, or too long a one, are remembered
@@ -36,4 +36,4 @@ private:
   alignas(16) unsigned char old_[128]; // a sigset_t
 };
 
-} // namespace gewebe
+} // namespace gewebe::formats

@@ -25,7 +25,7 @@
 #include <utility>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::formats {
 namespace {
 
 constexpr std::size_t buffer_bytes = 1U << 20U;
@@ -640,4 +640,4 @@ void hold_standard_streams() {
       (void)::open("/dev/null", fd == 0 ? O_WRONLY : O_RDONLY);
 }
 
-} // namespace gewebe
+} // namespace gewebe::formats

@@ -10,7 +10,7 @@
 #include <string>
 #include <string_view>
 
-namespace gewebe {
+namespace gewebe::formats {
 
 /// Bytes that were read, in pages of their own, which live as long as a copy of this.
 class InputBytes {
@@ -130,4 +130,4 @@ private:
 /// only.
 void install_signal_cleanup();
 
-} // namespace gewebe
+} // namespace gewebe::formats

@@ -9,7 +9,7 @@
 // Based on: Abaqus Analysis User's Guide, "Input syntax rules", *NODE, *ELEMENT, *ELSET,
 // *SOLID SECTION; ccx (dhondt.de) reads the same words.
 
-namespace gewebe::tet {
+namespace gewebe::formats::tet {
 namespace {
 
 /// Tetrahedra of 4 and of 10 nodes; C3D10's middles are those of VTK.
@@ -69,7 +69,7 @@ public:
   InpReader(std::string_view bytes, const std::string& name, TetReadStats& stats)
       : bytes_(bytes), name_(name), stats_(stats) {}
 
-  TetMesh read() {
+  tetrahedra::TetMesh read() {
     while (const std::optional<std::string_view> line = next_line()) {
       if (line->starts_with('*'))
         begin(keyword_of(*line));
@@ -336,7 +336,7 @@ private:
 
 } // namespace
 
-TetMesh read_inp(std::string_view bytes, const std::string& name, TetReadStats& stats) {
+tetrahedra::TetMesh read_inp(std::string_view bytes, const std::string& name, TetReadStats& stats) {
   return InpReader(bytes, name, stats).read();
 }
 
@@ -345,12 +345,12 @@ namespace {
 /// Abaqus and CalculiX read 20 characters of a number.
 std::string number(double value) {
   constexpr std::size_t most = 20;
-  return limited_text(value, most);
+  return gewebe::text::limited_text(value, most);
 }
 
 } // namespace
 
-void write_inp(const TetMesh& mesh, const Sink& sink) {
+void write_inp(const tetrahedra::TetMesh& mesh, const Sink& sink) {
   Pieces out(sink);
   out << "*HEADING\ngewebe_tetmesh, millimetres\n*NODE, NSET=NALL\n";
   for (std::size_t p = 0; p < mesh.points.size(); ++p)
@@ -380,4 +380,4 @@ void write_inp(const TetMesh& mesh, const Sink& sink) {
   out.flush();
 }
 
-} // namespace gewebe::tet
+} // namespace gewebe::formats::tet

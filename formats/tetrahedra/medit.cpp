@@ -4,7 +4,7 @@
 // Based on: Frey, MEDIT: an interactive mesh visualization software, INRIA RT-0253, 2001; names of
 // quadratic elements as libMeshb (github.com/LoicMarechal/libMeshb) has them.
 
-namespace gewebe::tet {
+namespace gewebe::formats::tet {
 namespace {
 
 /// Sections of elements: number of integers of each; the last one is a reference.
@@ -45,7 +45,7 @@ public:
   MeditReader(std::string_view bytes, const std::string& name, TetReadStats& stats)
       : words_(bytes, name, '#'), stats_(stats) {}
 
-  TetMesh read() {
+  tetrahedra::TetMesh read() {
     if (words_.word() != "MeshVersionFormatted")
       words_.fail("no Medit mesh in text, expected MeshVersionFormatted");
     const std::uint64_t version = words_.count("the version");
@@ -158,11 +158,12 @@ private:
 
 } // namespace
 
-TetMesh read_medit(std::string_view bytes, const std::string& name, TetReadStats& stats) {
+tetrahedra::TetMesh read_medit(std::string_view bytes, const std::string& name,
+                               TetReadStats& stats) {
   return MeditReader(bytes, name, stats).read();
 }
 
-void write_medit(const TetMesh& mesh, const Sink& sink) {
+void write_medit(const tetrahedra::TetMesh& mesh, const Sink& sink) {
   Pieces out(sink);
   out << "MeshVersionFormatted 2\n# gewebe_tetmesh, millimetres\nDimension 3\nVertices\n"
       << mesh.points.size() << "\n";
@@ -180,4 +181,4 @@ void write_medit(const TetMesh& mesh, const Sink& sink) {
   out.flush();
 }
 
-} // namespace gewebe::tet
+} // namespace gewebe::formats::tet

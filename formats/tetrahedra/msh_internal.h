@@ -12,7 +12,7 @@
 #include <string>
 #include <string_view>
 
-namespace gewebe::tet {
+namespace gewebe::formats::tet {
 
 /// How the physical group of material 0 is called: none may have the number 0.
 constexpr std::string_view name_of_0 = "material 0";
@@ -61,4 +61,4 @@ private:
   bool binary_ = false, swap_ = false;
 };
 
-} // namespace gewebe::tet
+} // namespace gewebe::formats::tet

@@ -3,7 +3,7 @@
 // Based on: Geuzaine, Remacle, Gmsh reference manual 4.11, MSH file format, version 4.1, and
 // legacy version 2.2.
 
-namespace gewebe::tet {
+namespace gewebe::formats::tet {
 
 void MshNumbers::read_format() {
   const std::string_view version = words_.word();
@@ -79,4 +79,4 @@ void MshNumbers::skip_to(const std::string& end) {
   words_.move_to(at + end.size());
 }
 
-} // namespace gewebe::tet
+} // namespace gewebe::formats::tet

@@ -6,7 +6,7 @@
 // Based on: Geuzaine, Remacle, Gmsh reference manual 4.11, MSH file format, version 4.1, and
 // legacy versions 1 and 2.2.
 
-namespace gewebe::tet {
+namespace gewebe::formats::tet {
 namespace {
 
 /// What an element type is to us.
@@ -96,7 +96,7 @@ public:
   MshReader(std::string_view bytes, const std::string& name, TetReadStats& stats)
       : in_(bytes, name), stats_(stats) {}
 
-  TetMesh read() {
+  tetrahedra::TetMesh read() {
     for (std::string_view section = in_.words().word(); !section.empty();
          section = in_.words().word())
       read_section(section);
@@ -404,7 +404,7 @@ private:
   }
 
   /// Physical groups are the material; where there are none, entities, if there are several.
-  TetMesh finish() {
+  tetrahedra::TetMesh finish() {
     bool groups = false, several = false;
     for (std::size_t t = 0; t < entity_.size(); ++t) {
       groups = groups || physical_[t] != 0;
@@ -440,8 +440,8 @@ private:
 
 } // namespace
 
-TetMesh read_msh(std::string_view bytes, const std::string& name, TetReadStats& stats) {
+tetrahedra::TetMesh read_msh(std::string_view bytes, const std::string& name, TetReadStats& stats) {
   return MshReader(bytes, name, stats).read();
 }
 
-} // namespace gewebe::tet
+} // namespace gewebe::formats::tet

@@ -4,7 +4,7 @@
 // Based on: Geuzaine, Remacle, Gmsh reference manual 4.11, MSH file format, version 4.1, and
 // legacy version 2.2.
 
-namespace gewebe::tet {
+namespace gewebe::formats::tet {
 namespace {
 
 /// Corners and middles of one in Gmsh's order.
@@ -16,14 +16,14 @@ std::array<std::uint32_t, 10> gmsh_nodes(const TetNodes& nodes) {
   return order;
 }
 
-int type_of(const TetMesh& mesh) {
+int type_of(const tetrahedra::TetMesh& mesh) {
   return mesh.middles.empty() ? 4 : 11;
 }
 
 /// The numbers of entities and of their physical groups: those of the materials, ascending, and the
 /// smallest free one for material 0. Of a mesh without materials one, 1, and no groups.
 struct Groups {
-  explicit Groups(const TetMesh& mesh) : any(!mesh.material.empty()) {
+  explicit Groups(const tetrahedra::TetMesh& mesh) : any(!mesh.material.empty()) {
     for (const std::int32_t m : mesh.material)
       if (materials.empty() || m != *materials.rbegin())
         materials.insert(m);
@@ -33,7 +33,7 @@ struct Groups {
       ++of_0;
   }
   std::int32_t of(std::int32_t material) const { return material == 0 ? of_0 : material; }
-  std::int32_t of(const TetMesh& mesh, std::size_t t) const {
+  std::int32_t of(const tetrahedra::TetMesh& mesh, std::size_t t) const {
     return of(mesh.material.empty() ? 0 : mesh.material[t]);
   }
   void write_name(Pieces& out) const {
@@ -48,7 +48,7 @@ struct Groups {
 
 } // namespace
 
-void write_msh2(const TetMesh& mesh, const Sink& sink) {
+void write_msh2(const tetrahedra::TetMesh& mesh, const Sink& sink) {
   Pieces out(sink);
   const Groups groups(mesh);
   out << "$MeshFormat\n2.2 0 8\n$EndMeshFormat\n";
@@ -72,7 +72,7 @@ void write_msh2(const TetMesh& mesh, const Sink& sink) {
   out.flush();
 }
 
-void write_msh4(const TetMesh& mesh, const Sink& sink) {
+void write_msh4(const tetrahedra::TetMesh& mesh, const Sink& sink) {
   const auto size = [](std::size_t n) { return std::uint64_t{n}; };
   const Groups groups(mesh);
   Pieces out(sink);
@@ -84,7 +84,7 @@ void write_msh4(const TetMesh& mesh, const Sink& sink) {
   for (int dimension = 0; dimension < 3; ++dimension)
     out.put(size(0));
   out.put(size(groups.materials.size()));
-  const Box3 box = mesh.points.empty() ? Box3{{}, {}} : bounding_box(mesh);
+  const Box3 box = mesh.points.empty() ? Box3{{}, {}} : tetrahedra::bounding_box(mesh);
   for (const std::int32_t material : groups.materials) {
     out.put(groups.of(material));
     out.put(box.min);
@@ -138,4 +138,4 @@ void write_msh4(const TetMesh& mesh, const Sink& sink) {
   out.flush();
 }
 
-} // namespace gewebe::tet
+} // namespace gewebe::formats::tet

@@ -8,10 +8,10 @@
 #include <algorithm>
 #include <cctype>
 
-namespace gewebe {
+namespace gewebe::formats {
 namespace tet {
 
-TetMesh Tetrahedra::take_unless_zero() {
+tetrahedra::TetMesh Tetrahedra::take_unless_zero() {
   if (std::ranges::all_of(mesh.material, [](std::int32_t m) { return m == 0; }))
     mesh.material = {};
   return std::move(mesh);
@@ -42,7 +42,7 @@ TetgenFiles tetgen_names(const std::string& name) {
   return names;
 }
 
-TetMesh read_tetgen(Input& input, std::uint64_t max_memory) {
+tetrahedra::TetMesh read_tetgen(Input& input, std::uint64_t max_memory) {
   const TetgenFiles names = tetgen_names(input.name());
   Input beside(names.node == input.name() ? names.ele : names.node, false);
   TetgenFiles bytes{input.read_all(max_memory), beside.read_all(max_memory)};
@@ -51,7 +51,7 @@ TetMesh read_tetgen(Input& input, std::uint64_t max_memory) {
   return tet_mesh_from_tetgen(bytes, names);
 }
 
-void write_tetgen(Output& output, const TetMesh& mesh, const Output::Options& options) {
+void write_tetgen(Output& output, const tetrahedra::TetMesh& mesh, const Output::Options& options) {
   const TetgenFiles names = tetgen_names(output.name());
   const bool nodes = names.node == output.name();
   Output::Options of_beside = options;
@@ -68,7 +68,7 @@ void write_tetgen(Output& output, const TetMesh& mesh, const Output::Options& op
   beside.commit();
 }
 
-void write_to(const TetMesh& mesh, Kind kind, const Sink& sink) {
+void write_to(const tetrahedra::TetMesh& mesh, Kind kind, const Sink& sink) {
   if (kind == Kind::ply)
     tet::write_ply(mesh, sink);
   else if (kind == Kind::vtu)
@@ -111,12 +111,12 @@ bool holds_tetrahedra(std::string_view peeked, Kind kind) {
   return header.find("\nelement tetrahedron ") != std::string_view::npos;
 }
 
-TetMesh tet_mesh_from_bytes(std::string_view bytes, const std::string& name, Kind kind,
-                            TetReadStats* stats) {
+tetrahedra::TetMesh tet_mesh_from_bytes(std::string_view bytes, const std::string& name, Kind kind,
+                                        TetReadStats* stats) {
   TetReadStats unused;
   TetReadStats& counts = stats == nullptr ? unused : *stats;
-  return at(name, [&] {
-    TetMesh mesh;
+  return gewebe::at(name, [&] {
+    tetrahedra::TetMesh mesh;
     if (kind == Kind::ply)
       mesh = tet::read_ply(bytes, name, counts);
     else if (kind == Kind::vtu)
@@ -134,35 +134,37 @@ TetMesh tet_mesh_from_bytes(std::string_view bytes, const std::string& name, Kin
                                          : std::string(kind_name(kind)) + " has no tetrahedra") +
                   ", expected one of " + kind_list(readable_tet_kinds()) +
                   " by content, suffix or --format");
-    check_mesh(mesh);
+    tetrahedra::check_mesh(mesh);
     return mesh;
   });
 }
 
-TetMesh read_tet_mesh(Input& input, const TetReadOptions& options, TetReadStats* stats) {
+tetrahedra::TetMesh read_tet_mesh(Input& input, const TetReadOptions& options,
+                                  TetReadStats* stats) {
   TetReadStats counts;
-  TetMesh mesh;
+  tetrahedra::TetMesh mesh;
   if (options.kind == Kind::tetgen)
     mesh = read_tetgen(input, options.max_memory);
   else
     mesh = tet_mesh_from_bytes(input.read_all(options.max_memory), input.name(), options.kind,
                                &counts);
-  at(input.name(), [&] { scale_points(mesh.points, options.scale); });
+  gewebe::at(input.name(), [&] { scale_points(mesh.points, options.scale); });
   if (options.drop_unused)
-    counts.dropped_points = drop_unused_points(mesh);
+    counts.dropped_points = tetrahedra::drop_unused_points(mesh);
   if (stats != nullptr)
     *stats = counts;
   return mesh;
 }
 
-std::string tet_mesh_bytes(const TetMesh& mesh, Kind kind) {
+std::string tet_mesh_bytes(const tetrahedra::TetMesh& mesh, Kind kind) {
   std::string bytes;
   write_to(mesh, kind, [&](std::string_view piece) { bytes += piece; });
   return bytes;
 }
 
-void write_tet_mesh(Output& output, const TetMesh& mesh, Kind kind, const Output::Options& beside) {
-  at(output.name(), [&] {
+void write_tet_mesh(Output& output, const tetrahedra::TetMesh& mesh, Kind kind,
+                    const Output::Options& beside) {
+  gewebe::at(output.name(), [&] {
     if (kind == Kind::tetgen)
       write_tetgen(output, mesh, beside);
     else
@@ -170,4 +172,4 @@ void write_tet_mesh(Output& output, const TetMesh& mesh, Kind kind, const Output
   });
 }
 
-} // namespace gewebe
+} // namespace gewebe::formats

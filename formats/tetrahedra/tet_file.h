@@ -11,7 +11,7 @@
 #include <string_view>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::formats {
 
 /// ply, vtu, msh, medit, tetgen, vtk, inp.
 const std::vector<Kind>& readable_tet_kinds();
@@ -43,7 +43,8 @@ struct TetReadStats {
 /// \throw Error with place: anything missing, surplus, out of range, not finite; counts that the
 /// file can't hold; hexahedra, prisms, pyramids and elements of third order, by name; tetrahedra of
 /// both orders; a kind that is not readable
-TetMesh read_tet_mesh(Input& input, const TetReadOptions& options, TetReadStats* stats = nullptr);
+tetrahedra::TetMesh read_tet_mesh(Input& input, const TetReadOptions& options,
+                                  TetReadStats* stats = nullptr);
 
 /// Writes the mesh, given in mm, as `kind`; the caller commits. Reading it gives the same mesh bit
 /// for bit, except a material that is 0 everywhere, for which Medit has no other word than none,
@@ -52,19 +53,19 @@ TetMesh read_tet_mesh(Input& input, const TetReadOptions& options, TetReadStats*
 /// so that only a rename that fails leaves one without the other. \pre check_mesh(mesh) passes
 /// \throw Error with place: TetGen on a pipe, too many points for the format; UsageError if the
 /// kind is not writable
-void write_tet_mesh(Output& output, const TetMesh& mesh, Kind kind,
+void write_tet_mesh(Output& output, const tetrahedra::TetMesh& mesh, Kind kind,
                     const Output::Options& beside = {});
 
 /// The same from and to memory, except TetGen. \throw Error, place `name` or `name:LINE`
-TetMesh tet_mesh_from_bytes(std::string_view bytes, const std::string& name, Kind kind,
-                            TetReadStats* stats = nullptr);
-std::string tet_mesh_bytes(const TetMesh& mesh, Kind kind);
+tetrahedra::TetMesh tet_mesh_from_bytes(std::string_view bytes, const std::string& name, Kind kind,
+                                        TetReadStats* stats = nullptr);
+std::string tet_mesh_bytes(const tetrahedra::TetMesh& mesh, Kind kind);
 
 /// TetGen's two files from and to memory.
 struct TetgenFiles {
   std::string node, ele;
 };
-TetMesh tet_mesh_from_tetgen(const TetgenFiles& bytes, const TetgenFiles& names);
-TetgenFiles tetgen_bytes(const TetMesh& mesh);
+tetrahedra::TetMesh tet_mesh_from_tetgen(const TetgenFiles& bytes, const TetgenFiles& names);
+TetgenFiles tetgen_bytes(const tetrahedra::TetMesh& mesh);
 
-} // namespace gewebe
+} // namespace gewebe::formats

@@ -21,25 +21,26 @@
 #include <utility>
 #include <vector>
 
-namespace gewebe::tet {
+namespace gewebe::formats::tet {
 
 static_assert(std::endian::native == std::endian::little, "the codecs copy little-endian memory");
 
-TetMesh read_ply(std::string_view bytes, const std::string& name, TetReadStats& stats);
-TetMesh read_vtu(std::string_view bytes, const std::string& name, TetReadStats& stats);
-TetMesh read_msh(std::string_view bytes, const std::string& name, TetReadStats& stats);
-TetMesh read_vtk(std::string_view bytes, const std::string& name, TetReadStats& stats);
-TetMesh read_inp(std::string_view bytes, const std::string& name, TetReadStats& stats);
-TetMesh read_medit(std::string_view bytes, const std::string& name, TetReadStats& stats);
-void write_ply(const TetMesh& mesh, const Sink& sink);
-void write_vtu(const TetMesh& mesh, const Sink& sink);
-void write_vtk(const TetMesh& mesh, const Sink& sink);
-void write_inp(const TetMesh& mesh, const Sink& sink);
-void write_msh2(const TetMesh& mesh, const Sink& sink);
-void write_msh4(const TetMesh& mesh, const Sink& sink);
-void write_medit(const TetMesh& mesh, const Sink& sink);
-void write_node(const TetMesh& mesh, const Sink& sink);
-void write_ele(const TetMesh& mesh, const Sink& sink);
+tetrahedra::TetMesh read_ply(std::string_view bytes, const std::string& name, TetReadStats& stats);
+tetrahedra::TetMesh read_vtu(std::string_view bytes, const std::string& name, TetReadStats& stats);
+tetrahedra::TetMesh read_msh(std::string_view bytes, const std::string& name, TetReadStats& stats);
+tetrahedra::TetMesh read_vtk(std::string_view bytes, const std::string& name, TetReadStats& stats);
+tetrahedra::TetMesh read_inp(std::string_view bytes, const std::string& name, TetReadStats& stats);
+tetrahedra::TetMesh read_medit(std::string_view bytes, const std::string& name,
+                               TetReadStats& stats);
+void write_ply(const tetrahedra::TetMesh& mesh, const Sink& sink);
+void write_vtu(const tetrahedra::TetMesh& mesh, const Sink& sink);
+void write_vtk(const tetrahedra::TetMesh& mesh, const Sink& sink);
+void write_inp(const tetrahedra::TetMesh& mesh, const Sink& sink);
+void write_msh2(const tetrahedra::TetMesh& mesh, const Sink& sink);
+void write_msh4(const tetrahedra::TetMesh& mesh, const Sink& sink);
+void write_medit(const tetrahedra::TetMesh& mesh, const Sink& sink);
+void write_node(const tetrahedra::TetMesh& mesh, const Sink& sink);
+void write_ele(const tetrahedra::TetMesh& mesh, const Sink& sink);
 
 /// VTK's types of cells.
 inline constexpr int vtk_linear = 10, vtk_quadratic = 24;
@@ -67,15 +68,15 @@ public:
     mesh.material.push_back(static_cast<std::int32_t>(material));
   }
   /// Without materials if all are 0.
-  TetMesh take_unless_zero();
+  tetrahedra::TetMesh take_unless_zero();
 
-  TetMesh mesh;
+  tetrahedra::TetMesh mesh;
 };
 
 /// The nodes of one, corners then middles: 4 or 10.
 class TetNodes {
 public:
-  TetNodes(const TetMesh& mesh, std::size_t t) {
+  TetNodes(const tetrahedra::TetMesh& mesh, std::size_t t) {
     for (std::size_t k = 0; k < 4; ++k)
       nodes_[k] = mesh.tetrahedra[t][k];
     if (mesh.middles.empty())
@@ -94,4 +95,4 @@ private:
   std::size_t size_ = 4;
 };
 
-} // namespace gewebe::tet
+} // namespace gewebe::formats::tet

@@ -7,7 +7,7 @@
 #include <optional>
 // Based on: Turk, The PLY polygon file format, 1994.
 
-namespace gewebe::tet {
+namespace gewebe::formats::tet {
 namespace {
 
 using namespace ply;
@@ -26,7 +26,7 @@ public:
   TetPlyReader(Source source, const Header& header, const std::string& name, TetReadStats& stats)
       : source_(std::move(source)), header_(header), name_(name), stats_(stats) {}
 
-  TetMesh read() {
+  tetrahedra::TetMesh read() {
     bool has_tetrahedra = false;
     for (const Element& element : header_.elements) {
       check_room(element);
@@ -143,7 +143,7 @@ private:
 
 } // namespace
 
-TetMesh read_ply(std::string_view bytes, const std::string& name, TetReadStats& stats) {
+tetrahedra::TetMesh read_ply(std::string_view bytes, const std::string& name, TetReadStats& stats) {
   const Header header = read_header(bytes, name);
   if (header.encoding == Encoding::ascii)
     return TetPlyReader(AsciiSource(bytes, name, header.bytes, header.lines), header, name, stats)
@@ -152,11 +152,11 @@ TetMesh read_ply(std::string_view bytes, const std::string& name, TetReadStats& 
   return TetPlyReader(BinarySource(bytes, name, header.bytes, swap), header, name, stats).read();
 }
 
-void write_ply(const TetMesh& mesh, const Sink& sink) {
+void write_ply(const tetrahedra::TetMesh& mesh, const Sink& sink) {
   if (mesh.points.size() > INT32_MAX)
     throw Error(std::to_string(mesh.points.size()) + " points, expected at most " +
                 std::to_string(INT32_MAX) + " in a PLY file");
-  const TetBoundary surface = boundary(mesh);
+  const tetrahedra::TetBoundary surface = tetrahedra::boundary(mesh);
   Pieces out(sink);
   out << "ply\nformat binary_little_endian 1.0\ncomment gewebe_tetmesh, millimetres\n"
          "element vertex "
@@ -183,4 +183,4 @@ void write_ply(const TetMesh& mesh, const Sink& sink) {
   out.flush();
 }
 
-} // namespace gewebe::tet
+} // namespace gewebe::formats::tet

@@ -4,7 +4,7 @@
 // Based on: Si, TetGen user's manual 1.5, 5.1 (.node, .ele). The order of the middles of edges is
 // that of its output, 23 03 01 12 13 02.
 
-namespace gewebe {
+namespace gewebe::formats {
 namespace tet {
 namespace {
 
@@ -85,7 +85,7 @@ void read_ele(std::string_view bytes, const std::string& name, const Node& head,
 
 } // namespace
 
-void write_node(const TetMesh& mesh, const Sink& sink) {
+void write_node(const tetrahedra::TetMesh& mesh, const Sink& sink) {
   Pieces out(sink);
   out << "# gewebe_tetmesh, millimetres\n" << mesh.points.size() << " 3 0 0\n";
   for (std::size_t p = 0; p < mesh.points.size(); ++p) {
@@ -95,7 +95,7 @@ void write_node(const TetMesh& mesh, const Sink& sink) {
   out.flush();
 }
 
-void write_ele(const TetMesh& mesh, const Sink& sink) {
+void write_ele(const tetrahedra::TetMesh& mesh, const Sink& sink) {
   Pieces out(sink);
   out << "# gewebe_tetmesh\n"
       << mesh.tetrahedra.size() << (mesh.middles.empty() ? " 4 " : " 10 ")
@@ -114,18 +114,18 @@ void write_ele(const TetMesh& mesh, const Sink& sink) {
 
 } // namespace tet
 
-TetMesh tet_mesh_from_tetgen(const TetgenFiles& bytes, const TetgenFiles& names) {
+tetrahedra::TetMesh tet_mesh_from_tetgen(const TetgenFiles& bytes, const TetgenFiles& names) {
   tet::Tetrahedra result;
   const tet::Node head = tet::read_node(bytes.node, names.node, result.mesh.points);
   tet::read_ele(bytes.ele, names.ele, head, result);
   return std::move(result.mesh);
 }
 
-TetgenFiles tetgen_bytes(const TetMesh& mesh) {
+TetgenFiles tetgen_bytes(const tetrahedra::TetMesh& mesh) {
   TetgenFiles files;
   tet::write_node(mesh, [&](std::string_view piece) { files.node += piece; });
   tet::write_ele(mesh, [&](std::string_view piece) { files.ele += piece; });
   return files;
 }
 
-} // namespace gewebe
+} // namespace gewebe::formats

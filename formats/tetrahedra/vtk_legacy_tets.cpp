@@ -5,7 +5,7 @@
 #include <algorithm>
 // Based on: VTK file formats, docs.vtk.org, "Simple legacy formats".
 
-namespace gewebe::tet {
+namespace gewebe::formats::tet {
 namespace {
 
 /// Puts a number as big-endian bytes.
@@ -22,7 +22,7 @@ void put_integer(Pieces& out, std::uint64_t value) {
 
 } // namespace
 
-TetMesh read_vtk(std::string_view bytes, const std::string& name, TetReadStats& stats) {
+tetrahedra::TetMesh read_vtk(std::string_view bytes, const std::string& name, TetReadStats& stats) {
   vtk::Legacy legacy = vtk::read_legacy(bytes, name);
   if (!legacy.grid)
     throw Error(name, "PolyData, expected an unstructured grid of tetrahedra");
@@ -54,7 +54,7 @@ TetMesh read_vtk(std::string_view bytes, const std::string& name, TetReadStats& 
   return std::move(result.mesh);
 }
 
-void write_vtk(const TetMesh& mesh, const Sink& sink) {
+void write_vtk(const tetrahedra::TetMesh& mesh, const Sink& sink) {
   const std::uint64_t points = mesh.points.size(), cells = mesh.tetrahedra.size(),
                       nodes = mesh.middles.empty() ? 4 : 10;
   if (points > INT32_MAX || cells * (nodes + 1) > INT32_MAX)
@@ -86,4 +86,4 @@ void write_vtk(const TetMesh& mesh, const Sink& sink) {
   out.flush();
 }
 
-} // namespace gewebe::tet
+} // namespace gewebe::formats::tet

@@ -4,7 +4,7 @@
 #include <algorithm>
 // Based on: VTK file formats, docs.vtk.org, "XML file formats"; types of cells: vtkCellType.h.
 
-namespace gewebe::tet {
+namespace gewebe::formats::tet {
 namespace {
 
 constexpr int linear = vtk_linear, quadratic = vtk_quadratic;
@@ -15,7 +15,7 @@ public:
       : name_(name), stats_(stats),
         piece_(bytes, name, "UnstructuredGrid", {"Points", "Cells", "CellData"}) {}
 
-  TetMesh read() {
+  tetrahedra::TetMesh read() {
     result_.mesh.points = piece_.points();
     read_cells();
     return std::move(result_.mesh);
@@ -119,8 +119,8 @@ std::string refused_cell_name(std::int64_t type) {
   }
 }
 
-TetMesh read_vtu(std::string_view bytes, const std::string& name, TetReadStats& stats) {
+tetrahedra::TetMesh read_vtu(std::string_view bytes, const std::string& name, TetReadStats& stats) {
   return VtuReader(bytes, name, stats).read();
 }
 
-} // namespace gewebe::tet
+} // namespace gewebe::formats::tet

@@ -1,7 +1,7 @@
 #include "formats/tetrahedra/tet_file_internal.h"
 // Based on: VTK file formats, docs.vtk.org, "XML file formats".
 
-namespace gewebe::tet {
+namespace gewebe::formats::tet {
 namespace {
 
 /// The arrays that follow, with where each begins.
@@ -31,7 +31,7 @@ void put(Pieces& out, bool narrow, std::uint64_t number) {
 
 } // namespace
 
-void write_vtu(const TetMesh& mesh, const Sink& sink) {
+void write_vtu(const tetrahedra::TetMesh& mesh, const Sink& sink) {
   const std::uint64_t points = mesh.points.size(), cells = mesh.tetrahedra.size(),
                       nodes = mesh.middles.empty() ? 4 : 10;
   const bool narrow = points <= INT32_MAX && cells * nodes <= INT32_MAX;
@@ -79,4 +79,4 @@ void write_vtu(const TetMesh& mesh, const Sink& sink) {
   out.flush();
 }
 
-} // namespace gewebe::tet
+} // namespace gewebe::formats::tet

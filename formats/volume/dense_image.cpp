@@ -14,7 +14,7 @@
 #include <string_view>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::formats {
 namespace {
 
 using Sink = std::function<void(std::string_view)>;
@@ -24,7 +24,7 @@ struct Box {
 };
 
 /// The box of active voxels with a margin. \throw Error
-Box image_box(const Grid& grid, const std::string& name, Kind kind) {
+Box image_box(const volume::Grid& grid, const std::string& name, Kind kind) {
   Int3 min{}, max{};
   if (!grid.active_box(min, max))
     throw Error(name, "the volume has no active voxel, so that an image of it has no size; "
@@ -47,8 +47,8 @@ Box image_box(const Grid& grid, const std::string& name, Kind kind) {
 }
 
 /// Transform of the image's first voxel as index 0, in its own space.
-GridTransform image_transform(const Grid& grid, const Box& box, bool other) {
-  GridTransform t = grid.info().transform;
+volume::GridTransform image_transform(const volume::Grid& grid, const Box& box, bool other) {
+  volume::GridTransform t = grid.info().transform;
   const Vec3 first = t.to_world({static_cast<double>(box.min[0]), static_cast<double>(box.min[1]),
                                  static_cast<double>(box.min[2])});
   for (std::size_t row = 0; row < 3; ++row) {
@@ -59,8 +59,8 @@ GridTransform image_transform(const Grid& grid, const Box& box, bool other) {
   return t;
 }
 
-void write_voxels(const Grid& grid, const Box& box, const Sink& sink) {
-  GridAccessor values(grid);
+void write_voxels(const volume::Grid& grid, const Box& box, const Sink& sink) {
+  volume::GridAccessor values(grid);
   std::vector<float> slice(static_cast<std::size_t>(box.size[0]) *
                            static_cast<std::size_t>(box.size[1]));
   for (std::int32_t z = 0; z < box.size[2]; ++z) {
@@ -72,7 +72,7 @@ void write_voxels(const Grid& grid, const Box& box, const Sink& sink) {
   }
 }
 
-void write_packed(const Grid& grid, const Box& box, bool compressed, std::string_view head,
+void write_packed(const volume::Grid& grid, const Box& box, bool compressed, std::string_view head,
                   bool head_too, const Sink& sink) {
   if (!compressed) {
     sink(head);
@@ -88,11 +88,11 @@ void write_packed(const Grid& grid, const Box& box, bool compressed, std::string
 }
 
 std::string numbers(const std::array<double, 3>& values, const char* between) {
-  return number_text(values[0]) + between + number_text(values[1]) + between +
-         number_text(values[2]);
+  return gewebe::text::number_text(values[0]) + between + gewebe::text::number_text(values[1]) +
+         between + gewebe::text::number_text(values[2]);
 }
 
-std::array<double, 3> column(const GridTransform& t, std::size_t axis, double over = 1) {
+std::array<double, 3> column(const volume::GridTransform& t, std::size_t axis, double over = 1) {
   return {t.m[axis] / over, t.m[4 + axis] / over, t.m[8 + axis] / over};
 }
 
@@ -101,7 +101,8 @@ std::string sizes_text(const Int3& size) {
 }
 
 /// NRRD 4 (teem.sourceforge.net/nrrd/format.html).
-std::string nrrd_head(const Box& box, const GridTransform& t, const DenseImageOptions& options) {
+std::string nrrd_head(const Box& box, const volume::GridTransform& t,
+                      const DenseImageOptions& options) {
   const auto vector = [&](std::size_t axis) { return "(" + numbers(column(t, axis), ",") + ")"; };
   return std::string("NRRD0004\ntype: float\ndimension: 3\nspace: ") +
          (options.space == Space::lps ? "left-posterior-superior" : "right-anterior-superior") +
@@ -112,7 +113,8 @@ std::string nrrd_head(const Box& box, const GridTransform& t, const DenseImageOp
 }
 
 /// MetaImage (itk.org/Wiki/MetaIO/Documentation): LPS, directions of axes one after the other.
-std::string meta_head(const Box& box, const GridTransform& t, bool compressed, std::size_t bytes) {
+std::string meta_head(const Box& box, const volume::GridTransform& t, bool compressed,
+                      std::size_t bytes) {
   const Vec3 size = t.voxel_size();
   std::string head = "ObjectType = Image\nNDims = 3\nBinaryData = True\n"
                      "BinaryDataByteOrderMSB = False\n";
@@ -127,7 +129,7 @@ std::string meta_head(const Box& box, const GridTransform& t, bool compressed, s
 }
 
 /// The voxels as one zlib stream, whose size the head states.
-std::string packed_voxels(const Grid& grid, const Box& box) {
+std::string packed_voxels(const volume::Grid& grid, const Box& box) {
   z_stream stream{};
   if (deflateInit(&stream, 6) != Z_OK)
     throw Error("zlib can't begin to pack, expected memory for it");
@@ -156,12 +158,12 @@ const std::vector<Kind>& dense_image_kinds() {
   return kinds;
 }
 
-Int3 write_dense_image(Output& output, const Grid& grid, const DenseImageOptions& options) {
+Int3 write_dense_image(Output& output, const volume::Grid& grid, const DenseImageOptions& options) {
   const Box box = image_box(grid, output.name(), options.kind);
   const Space wanted = options.kind == Kind::nifti ? Space::ras
                        : options.kind == Kind::mha ? Space::lps
                                                    : options.space;
-  const GridTransform t = image_transform(grid, box, options.space != wanted);
+  const volume::GridTransform t = image_transform(grid, box, options.space != wanted);
   const Sink sink = [&](std::string_view bytes) { output.write(bytes); };
   if (options.kind == Kind::nifti) {
     const NiftiHeader head =
@@ -180,4 +182,4 @@ Int3 write_dense_image(Output& output, const Grid& grid, const DenseImageOptions
   return box.size;
 }
 
-} // namespace gewebe
+} // namespace gewebe::formats

@@ -7,7 +7,7 @@
 #include "geometry/space.h"
 #include "volume/grid.h"
 
-namespace gewebe {
+namespace gewebe::formats {
 
 /// nii, nrrd, mha.
 const std::vector<Kind>& dense_image_kinds();
@@ -22,6 +22,6 @@ struct DenseImageOptions {
 /// commits. \return the sizes of the image
 /// \throw Error if no voxel is active, or the image would have more than 2^33 voxels or, in NIfTI,
 /// more than 32767 along an axis; what Output throws
-Int3 write_dense_image(Output& output, const Grid& grid, const DenseImageOptions& options);
+Int3 write_dense_image(Output& output, const volume::Grid& grid, const DenseImageOptions& options);
 
-} // namespace gewebe
+} // namespace gewebe::formats

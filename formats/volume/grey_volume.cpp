@@ -4,7 +4,7 @@
 
 #include <utility>
 
-namespace gewebe {
+namespace gewebe::formats {
 namespace {
 
 GreyScan read(ByteSource& source, const std::string& name, const Context& context,
@@ -45,4 +45,4 @@ GreyScan grey_volume_from_bytes(std::string_view bytes, const std::string& name,
   return read(source, name, context, false);
 }
 
-} // namespace gewebe
+} // namespace gewebe::formats

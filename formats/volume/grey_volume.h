@@ -10,11 +10,11 @@
 #include <string_view>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::formats {
 
 struct GreyScan {
-  GreyVolume volume;  ///< the file's values after its slope and intercept, rounded to float
-  std::string format; ///< as LabelVolume::format
+  labels::GreyVolume volume; ///< the file's values after its slope and intercept, rounded to float
+  std::string format;        ///< as LabelVolume::format
   std::vector<std::string> warnings;
 };
 
@@ -22,7 +22,7 @@ struct GreyScan {
 /// behind that is not read. RAS, mm. \throw Error with the place, as below, for a wrong header
 struct VolumePlace {
   Int3 size{};
-  GridTransform transform;
+  volume::GridTransform transform;
   std::vector<std::string> warnings;
 };
 VolumePlace read_volume_place(Input& input, const Context& context);
@@ -37,4 +37,4 @@ GreyScan read_grey_volume(Input& input, const Context& context);
 GreyScan grey_volume_from_bytes(std::string_view bytes, const std::string& name,
                                 const Context& context);
 
-} // namespace gewebe
+} // namespace gewebe::formats

@@ -2,7 +2,7 @@
 
 #include "base/error.h"
 
-namespace gewebe {
+namespace gewebe::formats {
 
 GzipWriter::GzipWriter(const std::function<void(std::string_view)>& sink) : sink_(sink) {
   if (deflateInit2(&stream_, 6, Z_DEFLATED, 15 + 16, 8, Z_DEFAULT_STRATEGY) != Z_OK)
@@ -26,4 +26,4 @@ void GzipWriter::pack(std::string_view bytes, int flush) {
   } while (stream_.avail_out == 0);
 }
 
-} // namespace gewebe
+} // namespace gewebe::formats

@@ -7,7 +7,7 @@
 #include <functional>
 #include <string_view>
 
-namespace gewebe {
+namespace gewebe::formats {
 
 /// Packs bytes for a sink, which it does not outlive. The head has neither time nor name.
 class GzipWriter {
@@ -29,4 +29,4 @@ private:
   std::array<char, 1 << 16> out_{};
 };
 
-} // namespace gewebe
+} // namespace gewebe::formats

@@ -19,7 +19,7 @@
 #include <unordered_map>
 #include <utility>
 
-namespace gewebe {
+namespace gewebe::formats {
 namespace {
 
 constexpr std::int32_t largest_size = 1 << 20;
@@ -167,7 +167,7 @@ void read_label_rows(ByteSource& data, const std::string& name, const VoxelLayou
                               ", expected whole numbers");
       labels[i] = *label;
     }
-    at(name, [&] { take(labels); });
+    gewebe::at(name, [&] { take(labels); });
   });
 }
 
@@ -183,7 +183,8 @@ void read_grey_rows(ByteSource& data, const std::string& name, const VoxelLayout
 // Both grow as the bytes come, so that a header's claim alone takes no memory.
 
 /// Appends a row of bits, of the requested labels; returns how many.
-std::uint64_t append_bits(std::span<const std::int64_t> row, Counter& counter, LabelMask& mask) {
+std::uint64_t append_bits(std::span<const std::int64_t> row, Counter& counter,
+                          labels::LabelMask& mask) {
   mask.bits.resize(mask.bits.size() + mask.row_words());
   std::uint64_t* const words = mask.bits.data() + (mask.bits.size() - mask.row_words());
   std::uint64_t set = 0;
@@ -197,7 +198,7 @@ std::uint64_t append_bits(std::span<const std::int64_t> row, Counter& counter, L
 
 /// Appends a row of runs, of all labels or of the requested ones.
 void append_runs(const LabelRequest& request, std::span<const std::int64_t> row, Counter& counter,
-                 LabelRuns& labels) {
+                 labels::LabelRuns& labels) {
   for (std::size_t i = 0; i < row.size(); ++i) {
     const bool wanted = counter.count(row[i]) || request.labels.empty();
     const std::int64_t label = wanted ? row[i] : 0;
@@ -303,8 +304,9 @@ LabelRange numbered_label(const LabelRange& request,
   std::string list;
   for (const std::string& name : known)
     list += (list.empty() ? "" : ", ") + name;
-  throw Error(file, "has no label '" + request.name + "'" + suggestion(request.name, known) +
-                        ", expected some of " + list);
+  throw Error(file, "has no label '" + request.name + "'" +
+                        gewebe::text::suggestion(request.name, known) + ", expected some of " +
+                        list);
 }
 
 // ---- what the formats share
@@ -340,7 +342,7 @@ LabelVolume read_voxels(ByteSource& data, const std::string& name, const VoxelLa
   volume.mask.transform = layout.transform;
   const double words = static_cast<double>(volume.mask.row_words()) * layout.size[1] *
                        static_cast<double>(layout.size[2]);
-  at(name, [&] {
+  gewebe::at(name, [&] {
     // Twice, for a vector that grows holds the old content too. What comes through here in all
     // counts as well: it may be a small file that grows without end when it is unpacked.
     const double bytes = static_cast<double>(bytes_of(layout.type)) * layout.size[0] *
@@ -386,7 +388,7 @@ Int3 checked_size(const std::string& place, const std::array<std::int64_t, 3>& s
   return checked;
 }
 
-void check_affine(const std::string& place, const GridTransform& transform) {
+void check_affine(const std::string& place, const volume::GridTransform& transform) {
   for (const double number : transform.m)
     if (!(std::fabs(number) <= 1e12))
       throw Error(place, "the transform to the world has a number that is not finite or beyond "
@@ -475,7 +477,7 @@ std::string quoted(std::string_view text) {
 
 double number_of(const std::string& place, std::string_view word) {
   double value = 0;
-  const std::string_view digits = without_plus(word);
+  const std::string_view digits = gewebe::text::without_plus(word);
   const auto [rest, status] = std::from_chars(digits.data(), digits.data() + digits.size(), value);
   if (status != std::errc{} || rest != digits.data() + digits.size() || !std::isfinite(value))
     throw Error(place, quoted(word) + ", expected a finite number");
@@ -540,4 +542,4 @@ bool is_label_volume(std::string_view first_bytes) {
          is_inr(first_bytes);
 }
 
-} // namespace gewebe
+} // namespace gewebe::formats

@@ -30,7 +30,7 @@
 #include <utility>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::formats {
 
 /// Requested labels: one where both are equal, or those in between that the volume holds; or the
 /// one of a name, where that is not empty.
@@ -40,7 +40,7 @@ struct LabelRange {
 };
 
 struct LabelVolume {
-  LabelMask mask;           ///< of the requested labels
+  labels::LabelMask mask;   ///< of the requested labels
   std::uint64_t voxels = 0; ///< that are set in it
   std::string format;       ///< "NIfTI-1", "NIfTI-2", "NRRD", "MetaImage", "INR"
   std::vector<std::pair<std::int64_t, std::uint64_t>>
@@ -52,7 +52,7 @@ struct LabelVolume {
 
 /// Check of the mask's size and place by the caller, before a voxel is unpacked: it throws to
 /// refuse.
-using LabelCheck = std::function<void(const LabelMask& without_bits)>;
+using LabelCheck = std::function<void(const labels::LabelMask& without_bits)>;
 
 /// Reads forwards, from a pipe too; only files of two parts (.hdr, .nhdr, .mhd) need a name.
 /// Compression is detected by its bytes. Values must be whole numbers, in whatever type they are
@@ -71,7 +71,7 @@ LabelVolume label_volume_from_bytes(std::string_view bytes, const std::string& n
                                     const LabelCheck& check = {});
 
 struct AllLabels {
-  LabelRuns voxels;
+  labels::LabelRuns voxels;
   std::string format; ///< as above
   std::vector<std::string> warnings;
 };
@@ -88,4 +88,4 @@ AllLabels all_labels_from_bytes(std::string_view bytes, const std::string& name,
 /// not?
 bool is_label_volume(std::string_view first_bytes);
 
-} // namespace gewebe
+} // namespace gewebe::formats

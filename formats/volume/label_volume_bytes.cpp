@@ -9,7 +9,7 @@
 #include <cstring>
 #include <utility>
 
-namespace gewebe {
+namespace gewebe::formats {
 
 std::size_t MemoryBytes::read(char* to, std::size_t count) {
   const std::size_t n = std::min(count, rest_.size());
@@ -151,4 +151,4 @@ std::size_t InflatedBytes::read(char* to, std::size_t count) {
   return done;
 }
 
-} // namespace gewebe
+} // namespace gewebe::formats

@@ -6,7 +6,7 @@
 #include <array>
 #include <map>
 
-namespace gewebe {
+namespace gewebe::formats {
 namespace {
 
 constexpr std::string_view first_line = "#INRIMAGE-4#{";
@@ -113,4 +113,4 @@ LabelVolume read_inr(BufferedBytes& bytes, const LabelRequest& request) {
   return volume;
 }
 
-} // namespace gewebe
+} // namespace gewebe::formats

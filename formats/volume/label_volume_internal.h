@@ -14,7 +14,7 @@
 #include <string_view>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::formats {
 
 /// Bytes that come forwards.
 class ByteSource {
@@ -91,7 +91,7 @@ std::size_t bytes_of(ScalarType type);
 
 struct VoxelLayout {
   Int3 size{};
-  GridTransform transform; ///< RAS, mm
+  volume::GridTransform transform; ///< RAS, mm
   ScalarType type = ScalarType::u8;
   bool big_endian = false;
   double slope = 1, intercept = 0; ///< label = slope · stored + intercept
@@ -104,8 +104,8 @@ struct LabelRequest {
   const LabelCheck& check;
   bool side_files; ///< whether the name is that of a file, beside which others may be opened
   // One of these may receive the result in place of the mask's bits.
-  LabelRuns* all;
-  GreyVolume* grey;
+  labels::LabelRuns* all;
+  labels::GreyVolume* grey;
   VoxelLayout* layout = nullptr; ///< then no voxel is read
 };
 
@@ -127,7 +127,7 @@ LabelVolume read_voxels(ByteSource& data, const std::string& name, const VoxelLa
 /// Sizes as a header claims them. \throw Error unless each is 1 … 2^20
 Int3 checked_size(const std::string& place, const std::array<std::int64_t, 3>& size);
 /// \throw Error unless finite and far enough from singular
-void check_affine(const std::string& place, const GridTransform& transform);
+void check_affine(const std::string& place, const volume::GridTransform& transform);
 
 /// Words of a header's value, split at blanks.
 std::vector<std::string_view> words_of(std::string_view text);
@@ -181,4 +181,4 @@ bool is_nrrd(std::string_view bytes);
 bool is_meta_image(std::string_view bytes);
 bool is_inr(std::string_view bytes);
 
-} // namespace gewebe
+} // namespace gewebe::formats

@@ -7,7 +7,7 @@
 #include <array>
 #include <map>
 
-namespace gewebe {
+namespace gewebe::formats {
 namespace {
 
 /// "Key = value" lines up to ElementDataFile, the last one.
@@ -98,7 +98,7 @@ double unit_of(const Fields& fields) {
 
 /// World (LPS) = offset + sum over axes of index · spacing · direction; the direction of axis n is
 /// the n-th triple of TransformMatrix.
-GridTransform affine(const Fields& fields) {
+volume::GridTransform affine(const Fields& fields) {
   const double unit = unit_of(fields);
   const std::vector<double> spacing = fields.numbers(fields.need("ElementSpacing"), 3);
   std::vector<double> matrix{1, 0, 0, 0, 1, 0, 0, 0, 1}, offset{0, 0, 0};
@@ -106,7 +106,7 @@ GridTransform affine(const Fields& fields) {
     matrix = fields.numbers(*field, 9);
   if (const HeaderField* const field = fields.find("Offset"))
     offset = fields.numbers(*field, 3);
-  GridTransform t;
+  volume::GridTransform t;
   for (std::size_t row = 0; row < 3; ++row) {
     const double sign = row < 2 ? -unit : unit;
     for (std::size_t a = 0; a < 3; ++a)
@@ -176,4 +176,4 @@ LabelVolume read_meta_image(BufferedBytes& bytes, const LabelRequest& request) {
   return volume;
 }
 
-} // namespace gewebe
+} // namespace gewebe::formats

@@ -8,7 +8,7 @@
 #include <cmath>
 #include <cstring>
 
-namespace gewebe {
+namespace gewebe::formats {
 namespace {
 
 using namespace std::string_view_literals;
@@ -173,9 +173,9 @@ std::array<double, 9> rotation(const Header& header) {
           scale * (b * d - a * c),     scale * (c * d + a * b),     1 - scale * (b * b + c * c)};
 }
 
-GridTransform affine(const Header& header, const Int3& size, bool& oriented) {
+volume::GridTransform affine(const Header& header, const Int3& size, bool& oriented) {
   const Fields& f = header.f();
-  GridTransform t;
+  volume::GridTransform t;
   oriented = true;
   if (header.code(f.sform_code) > 0) {
     for (std::size_t n = 0; n < 12; ++n)
@@ -293,4 +293,4 @@ LabelVolume read_nifti(BufferedBytes& bytes, const LabelRequest& request) {
   return volume;
 }
 
-} // namespace gewebe
+} // namespace gewebe::formats

@@ -10,7 +10,7 @@
 #include <cmath>
 #include <map>
 
-namespace gewebe {
+namespace gewebe::formats {
 namespace {
 
 /// The fields of a header by name.
@@ -270,9 +270,9 @@ std::array<std::size_t, 3> space_axes(const HeaderField& sizes,
   return axes;
 }
 
-GridTransform affine(const Fields& fields, const std::string& name,
-                     const std::vector<std::optional<Vec3>>& directions,
-                     const std::array<std::size_t, 3>& axes, LabelVolume& volume) {
+volume::GridTransform affine(const Fields& fields, const std::string& name,
+                             const std::vector<std::optional<Vec3>>& directions,
+                             const std::array<std::size_t, 3>& axes, LabelVolume& volume) {
   std::array<Vec3, 3> column;
   Vec3 origin;
   const Vec3 sign = to_ras(fields, name, volume);
@@ -297,7 +297,7 @@ GridTransform affine(const Fields& fields, const std::string& name,
     if (const HeaderField* const units = fields.find("units"); units != nullptr && unit == 1)
       unit = unit_of(units);
   }
-  GridTransform t;
+  volume::GridTransform t;
   for (int row = 0; row < 3; ++row) {
     for (std::size_t a = 0; a < 3; ++a)
       t.m[static_cast<std::size_t>(4 * row) + a] = sign[row] * column.at(a)[row] * unit;
@@ -398,4 +398,4 @@ LabelVolume read_nrrd(BufferedBytes& bytes, const LabelRequest& request) {
   return volume;
 }
 
-} // namespace gewebe
+} // namespace gewebe::formats

@@ -5,10 +5,10 @@
 
 #include <algorithm>
 
-namespace gewebe {
+namespace gewebe::formats {
 namespace {
 
-void write_components(const LatticeField& field, float outside,
+void write_components(const tetrahedra::LatticeField& field, float outside,
                       const std::function<void(std::string_view)>& sink) {
   std::string piece;
   constexpr std::size_t together = 16384;
@@ -27,7 +27,7 @@ void write_components(const LatticeField& field, float outside,
 
 } // namespace
 
-PlaceLattice voxel_centres(const Int3& size, const GridTransform& transform) {
+tetrahedra::PlaceLattice voxel_centres(const Int3& size, const volume::GridTransform& transform) {
   const auto column = [&m = transform.m](std::size_t axis) {
     return Vec3{m[axis], m[4 + axis], m[8 + axis]};
   };
@@ -37,8 +37,9 @@ PlaceLattice voxel_centres(const Int3& size, const GridTransform& transform) {
            static_cast<std::size_t>(size[2])}};
 }
 
-void write_nifti_field(const LatticeField& field, const Int3& size, const GridTransform& transform,
-                       float outside, const std::string& what, bool gzip,
+void write_nifti_field(const tetrahedra::LatticeField& field, const Int3& size,
+                       const volume::GridTransform& transform, float outside,
+                       const std::string& what, bool gzip,
                        const std::function<void(std::string_view)>& sink) {
   constexpr std::int16_t vector = 1007;
   const NiftiHeader header =
@@ -54,4 +55,4 @@ void write_nifti_field(const LatticeField& field, const Int3& size, const GridTr
   packed.finish();
 }
 
-} // namespace gewebe
+} // namespace gewebe::formats

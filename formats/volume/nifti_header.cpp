@@ -5,12 +5,12 @@
 #include <cmath>
 #include <utility>
 
-namespace gewebe {
+namespace gewebe::formats {
 namespace {
 
 static_assert(std::endian::native == std::endian::little, "the header is little-endian memory");
 
-Vec3 column(const GridTransform& t, std::size_t axis) {
+Vec3 column(const volume::GridTransform& t, std::size_t axis) {
   return {t.m[axis], t.m[4 + axis], t.m[8 + axis]};
 }
 
@@ -40,7 +40,7 @@ Vec3 quaternion(const Vec3& x, const Vec3& y, const Vec3& z) {
   return a < 0 ? q * -1.0 : q;
 }
 
-void put_place(NiftiHeader& h, const GridTransform& t) {
+void put_place(NiftiHeader& h, const volume::GridTransform& t) {
   const Vec3 size = t.voxel_size();
   h.put_real(80, size.x);
   h.put_real(84, size.y);
@@ -68,7 +68,7 @@ void NiftiHeader::put_text(std::size_t at, std::string_view text) {
 }
 
 NiftiHeader nifti_header(const std::array<int, 8>& dim, std::int16_t intent,
-                         const GridTransform& transform, std::string_view what) {
+                         const volume::GridTransform& transform, std::string_view what) {
   NiftiHeader h;
   h.put<std::int32_t>(0, 348);
   h.put<char>(38, 'r'); // regular
@@ -88,4 +88,4 @@ NiftiHeader nifti_header(const std::array<int, 8>& dim, std::int16_t intent,
   return h;
 }
 
-} // namespace gewebe
+} // namespace gewebe::formats

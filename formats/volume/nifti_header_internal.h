@@ -9,7 +9,7 @@
 #include <cstring>
 #include <string_view>
 
-namespace gewebe {
+namespace gewebe::formats {
 
 inline constexpr std::size_t nifti_header_bytes = 352; // with the flag that no extension follows
 
@@ -31,6 +31,6 @@ private:
 /// and the qform where axes are at right angles. \param dim  number of axes, then their sizes
 /// \param what  a description; up to 79 bytes of it are written
 NiftiHeader nifti_header(const std::array<int, 8>& dim, std::int16_t intent,
-                         const GridTransform& transform, std::string_view what);
+                         const volume::GridTransform& transform, std::string_view what);
 
-} // namespace gewebe
+} // namespace gewebe::formats

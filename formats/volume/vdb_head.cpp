@@ -8,7 +8,7 @@
 #include <cstdint>
 #include <cstring>
 
-namespace gewebe {
+namespace gewebe::formats {
 namespace {
 
 class Reader {
@@ -85,4 +85,4 @@ void check_vdb_grid(std::string_view bytes, std::size_t position, const std::str
   check_grid(reader);
 }
 
-} // namespace gewebe
+} // namespace gewebe::formats

@@ -27,7 +27,7 @@
 #include <sstream>
 #include <streambuf>
 
-namespace gewebe {
+namespace gewebe::formats {
 
 const StreamWay usual_way =
     openvdb::OPENVDB_FILE_VERSION == openvdb::OPENVDB_FILE_VERSION_MULTIPASS_IO
@@ -157,8 +157,8 @@ Context without_progress(const Context& context) {
 /// Values of a leaf with this mask and byte.
 std::size_t values_in(const char* mask, char kind) {
   if (kind == openvdb::io::NO_MASK_AND_ALL_VALS)
-    return leaf_voxels;
-  std::array<std::uint64_t, leaf_voxels / 64> words{};
+    return volume::leaf_voxels;
+  std::array<std::uint64_t, volume::leaf_voxels / 64> words{};
   std::memcpy(words.data(), mask, sizeof words);
   std::size_t count = 0;
   for (const std::uint64_t word : words)
@@ -171,7 +171,7 @@ std::size_t values_in(const char* mask, char kind) {
 /// them, then the values: of all voxels if the byte says so, else of those that are active; by
 /// blosc the number of compressed bytes (negative: raw ones) and the bytes.
 std::size_t leaf_bytes(const MemoryBuffer& buffer, std::string_view bytes, Packing packing) {
-  constexpr std::size_t mask = leaf_voxels / 8;
+  constexpr std::size_t mask = volume::leaf_voxels / 8;
   const auto need = [&](std::size_t count) {
     if (count > bytes.size())
       buffer.fail();
@@ -209,7 +209,7 @@ std::size_t leaf_bytes(const MemoryBuffer& buffer, std::string_view bytes, Packi
   need(size + sizeof count);
   std::memcpy(&count, bytes.data() + size, sizeof count);
   size += sizeof count;
-  if (count > static_cast<std::int64_t>(bytes.size()) || -count > leaf_voxels * 4)
+  if (count > static_cast<std::int64_t>(bytes.size()) || -count > volume::leaf_voxels * 4)
     buffer.fail();
   size += static_cast<std::size_t>(count < 0 ? -count : count);
   need(size);
@@ -220,16 +220,16 @@ std::size_t leaf_bytes(const MemoryBuffer& buffer, std::string_view bytes, Packi
 /// a packing OpenVDB reads them.
 class ReadGrid final : public openvdb::FloatGrid {
 public:
-  ReadGrid(const Context& context, const std::shared_ptr<LeafStorage>& storage,
+  ReadGrid(const Context& context, const std::shared_ptr<volume::LeafStorage>& storage,
            std::optional<Packing> packing)
-      : openvdb::FloatGrid(make_tree(0, storage)), context_(without_progress(context)),
+      : openvdb::FloatGrid(volume::make_tree(0, storage)), context_(without_progress(context)),
         storage_(storage), packing_(packing) {}
 
   void readBuffers(std::istream& stream) override {
-    std::vector<FloatLeaf*> leaves;
+    std::vector<volume::FloatLeaf*> leaves;
     leaves.reserve(tree().leafCount());
     tree().getNodes(leaves);
-    double bytes = static_cast<double>(leaves.size()) * leaf_voxels * sizeof(float);
+    double bytes = static_cast<double>(leaves.size()) * volume::leaf_voxels * sizeof(float);
     for (const ZeroPages& pages : storage_->pages) // of grids before it
       bytes += static_cast<double>(pages.size());
     require_memory(context_, bytes, "the volume");
@@ -250,7 +250,7 @@ public:
     buffer.skip(done);
 
     auto* const values = reinterpret_cast<float*>(
-        storage_->pages.emplace_back(leaves.size() * leaf_voxels * sizeof(float)).data());
+        storage_->pages.emplace_back(leaves.size() * volume::leaf_voxels * sizeof(float)).data());
     const auto metadata = openvdb::io::getStreamMetadataPtr(stream);
     parallel_blocks(context_, leaves.size(), leaves_at_once,
                     [&](std::size_t begin, std::size_t end) {
@@ -260,7 +260,7 @@ public:
                       auto own = std::make_shared<openvdb::io::StreamMetadata>(*metadata);
                       openvdb::io::setStreamMetadataPtr(part, own, /*transfer=*/false);
                       for (std::size_t n = begin; n < end; ++n) {
-                        borrow_values(*leaves[n], values + n * leaf_voxels);
+                        volume::borrow_values(*leaves[n], values + n * volume::leaf_voxels);
                         leaves[n]->readBuffers(part, /*fromHalf=*/false);
                       }
                     });
@@ -269,7 +269,7 @@ public:
 
 private:
   Context context_;
-  std::shared_ptr<LeafStorage> storage_;
+  std::shared_ptr<volume::LeafStorage> storage_;
   std::optional<Packing> packing_;
 };
 
@@ -278,7 +278,7 @@ private:
 class ReadArchive final : public openvdb::io::Archive {
 public:
   openvdb::GridPtrVec read(MemoryBuffer& buffer, const Context& context,
-                           const std::shared_ptr<LeafStorage>& storage, StreamWay way) {
+                           const std::shared_ptr<volume::LeafStorage>& storage, StreamWay way) {
     std::istream stream(&buffer);
     stream.exceptions(std::ios::badbit | std::ios::failbit | std::ios::eofbit);
     readHeader(stream);
@@ -386,7 +386,7 @@ public:
       : openvdb::FloatGrid(std::move(tree)), context_(without_progress(context)) {}
 
   void writeBuffers(std::ostream& stream) const override {
-    std::vector<const FloatLeaf*> leaves;
+    std::vector<const volume::FloatLeaf*> leaves;
     leaves.reserve(tree().leafCount());
     tree().getNodes(leaves);
     const auto metadata = openvdb::io::getStreamMetadataPtr(stream);
@@ -483,11 +483,12 @@ std::string uuid_of(std::uint64_t digest) {
   return uuid;
 }
 
-GridTransform transform_of(const openvdb::math::Transform& transform, const std::string& name) {
+volume::GridTransform transform_of(const openvdb::math::Transform& transform,
+                                   const std::string& name) {
   if (!transform.isLinear())
     throw Error(name, "the grid has a frustum transform, expected an affine one");
   const openvdb::Mat4R matrix = transform.baseMap()->getAffineMap()->getMat4();
-  GridTransform result; // OpenVDB multiplies row vectors from the left
+  volume::GridTransform result; // OpenVDB multiplies row vectors from the left
   for (int row = 0; row < 3; ++row)
     for (int column = 0; column < 4; ++column)
       result.m[static_cast<std::size_t>(row * 4 + column)] = matrix(column, row);
@@ -500,9 +501,9 @@ GridTransform transform_of(const openvdb::math::Transform& transform, const std:
   return result;
 }
 
-openvdb::math::Transform::Ptr native_transform(const GridTransform& transform) {
+openvdb::math::Transform::Ptr native_transform(const volume::GridTransform& transform) {
   const auto& m = transform.m;
-  if (transform == uniform_transform(m[0]))
+  if (transform == volume::uniform_transform(m[0]))
     return openvdb::math::Transform::createLinearTransform(m[0]);
   return openvdb::math::Transform::createLinearTransform(
       openvdb::Mat4R(m[0], m[4], m[8], 0.0, m[1], m[5], m[9], 0.0, m[2], m[6], m[10], 0.0, m[3],
@@ -550,14 +551,14 @@ openvdb::FloatGrid::Ptr choose_grid(const openvdb::GridPtrVec& grids, const std:
   return floats[0];
 }
 
-Grid parse_volume(std::string_view bytes, const std::string& name, const Context& context,
-                  StreamWay way, Space* space) {
+volume::Grid parse_volume(std::string_view bytes, const std::string& name, const Context& context,
+                          StreamWay way, Space* space) {
   MemoryBuffer buffer(bytes, name);
-  const auto storage = std::make_shared<LeafStorage>();
+  const auto storage = std::make_shared<volume::LeafStorage>();
   openvdb::FloatGrid::Ptr native =
       choose_grid(ReadArchive().read(buffer, context, storage, way), name);
   openvdb::FloatTree::Ptr tree = native->treePtr();
-  GridInfo info;
+  volume::GridInfo info;
   info.transform = transform_of(native->transform(), name);
   info.background = native->background();
   info.level_set = native->getGridClass() == openvdb::GRID_LEVEL_SET;
@@ -566,7 +567,7 @@ Grid parse_volume(std::string_view bytes, const std::string& name, const Context
   if (space != nullptr)
     *space = space_metadata(*native, name);
   native.reset(); // the tree has one owner
-  Grid grid = make_grid(std::move(info), std::move(tree), storage);
+  volume::Grid grid = volume::make_grid(std::move(info), std::move(tree), storage);
   if (!grid.summary(context).finite)
     throw Error(name, "a voxel's value is not finite");
   return grid;
@@ -611,24 +612,25 @@ void refuse_other_kinds(std::string_view bytes, const std::string& name) {
 
 } // namespace
 
-Grid read_volume(Input& input, const Context& context, Space* space) {
+volume::Grid read_volume(Input& input, const Context& context, Space* space) {
   return volume_from_bytes(input.read_all_pages(context.max_memory).view(), input.name(), context,
                            space);
 }
 
-Grid volume_from_bytes(std::string_view bytes, const std::string& name, const Context& context,
-                       Space* space) {
+volume::Grid volume_from_bytes(std::string_view bytes, const std::string& name,
+                               const Context& context, Space* space) {
   return volume_from_bytes(bytes, name, context, usual_way, space);
 }
 
-Grid volume_from_bytes(std::string_view bytes, const std::string& name, const Context& context,
-                       StreamWay way, Space* space) {
+volume::Grid volume_from_bytes(std::string_view bytes, const std::string& name,
+                               const Context& context, StreamWay way, Space* space) {
   initialize_openvdb();
   refuse_other_kinds(bytes, name);
   check_vdb_head(bytes, name);
   Remarks remarks;
   try {
-    Grid grid = at(name, [&] { return parse_volume(bytes, name, context, way, space); });
+    volume::Grid grid =
+        gewebe::at(name, [&] { return parse_volume(bytes, name, context, way, space); });
     if (const std::string remark = remarks.text(); !remark.empty())
       throw Error(name, fault_of(remark));
     return grid;
@@ -641,15 +643,15 @@ Grid volume_from_bytes(std::string_view bytes, const std::string& name, const Co
   }
 }
 
-void write_volume(Output& output, const Grid& grid, const Context& context, Packing packing,
+void write_volume(Output& output, const volume::Grid& grid, const Context& context, Packing packing,
                   Space space) {
   write_volume(output, grid, context, packing, usual_way, space);
 }
 
-void write_volume(Output& output, const Grid& grid, const Context& context, Packing packing,
+void write_volume(Output& output, const volume::Grid& grid, const Context& context, Packing packing,
                   StreamWay way, Space space) {
   initialize_openvdb();
-  const GridInfo& info = grid.info();
+  const volume::GridInfo& info = grid.info();
   const auto native = std::make_shared<WriteGrid>(grid.native()->tree, context);
   native->setTransform(native_transform(info.transform));
   native->setName(info.name);
@@ -675,4 +677,4 @@ void write_volume(Output& output, const Grid& grid, const Context& context, Pack
   archive.write(openvdb::GridCPtrVec{std::make_shared<openvdb::FloatGrid>(*native)});
 }
 
-} // namespace gewebe
+} // namespace gewebe::formats

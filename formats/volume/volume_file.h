@@ -9,16 +9,16 @@
 #include <string>
 #include <string_view>
 
-namespace gewebe {
+namespace gewebe::formats {
 
 /// Reads the grid `density`, or the only float grid if none has that name.
 /// \throw Error with the place for anything that is not a whole, finite, affine float grid
 /// `space` gets what the metadata gewebe_space states.
-Grid read_volume(Input& input, const Context& context, Space* space = nullptr);
+volume::Grid read_volume(Input& input, const Context& context, Space* space = nullptr);
 
 /// The same for bytes that are there already.
-Grid volume_from_bytes(std::string_view bytes, const std::string& name, const Context& context = {},
-                       Space* space = nullptr);
+volume::Grid volume_from_bytes(std::string_view bytes, const std::string& name,
+                               const Context& context = {}, Space* space = nullptr);
 
 /// How the values of leaves stand in a stream: those of active voxels, which cost a read and a
 /// write of memory alone, or these packed by blosc, to half to nine tenths of the bytes and at
@@ -26,7 +26,7 @@ Grid volume_from_bytes(std::string_view bytes, const std::string& name, const Co
 enum class Packing { blosc, none };
 
 /// Writes one grid.
-void write_volume(Output& output, const Grid& grid, const Context& context,
+void write_volume(Output& output, const volume::Grid& grid, const Context& context,
                   Packing packing = Packing::blosc, Space space = Space::unknown);
 
 /// What the head of an OpenVDB stream says, checked without OpenVDB: it believes every size it
@@ -37,4 +37,4 @@ void check_vdb_head(std::string_view bytes, const std::string& name);
 /// The same for a grid whose descriptor begins at `position`.
 void check_vdb_grid(std::string_view bytes, std::size_t position, const std::string& name);
 
-} // namespace gewebe
+} // namespace gewebe::formats

@@ -3,7 +3,7 @@
 
 #include "formats/volume/volume_file.h"
 
-namespace gewebe {
+namespace gewebe::formats {
 
 /// Layout of leaves in a stream.
 enum class StreamWay {
@@ -14,9 +14,9 @@ enum class StreamWay {
 /// The way that the others take: parallel, unless OpenVDB writes a format that we don't know.
 extern const StreamWay usual_way;
 
-Grid volume_from_bytes(std::string_view bytes, const std::string& name, const Context& context,
-                       StreamWay way, Space* space = nullptr);
-void write_volume(Output& output, const Grid& grid, const Context& context, Packing packing,
+volume::Grid volume_from_bytes(std::string_view bytes, const std::string& name,
+                               const Context& context, StreamWay way, Space* space = nullptr);
+void write_volume(Output& output, const volume::Grid& grid, const Context& context, Packing packing,
                   StreamWay way, Space space = Space::unknown);
 
-} // namespace gewebe
+} // namespace gewebe::formats

@@ -7,7 +7,7 @@
 #include <filesystem>
 #include <string_view>
 
-namespace gewebe {
+namespace gewebe::formats {
 namespace {
 
 constexpr const char* library_name = "gewebe-volume.so";
@@ -43,10 +43,11 @@ Function* function_named(const char* name) {
 
 } // namespace
 
-VolumeView view_volume_bytes(std::string bytes, const std::string& name,
-                             const VolumeViewOptions& options, const Context& context) {
-  return at(name, [&] {
-    VolumeView view;
+shading::VolumeView view_volume_bytes(std::string bytes, const std::string& name,
+                                      const shading::VolumeViewOptions& options,
+                                      const Context& context) {
+  return gewebe::at(name, [&] {
+    shading::VolumeView view;
     function_named<decltype(gewebe_view_volume)>("gewebe_view_volume")(&bytes, &name, &options,
                                                                        &context, &view);
     return view;
@@ -55,7 +56,7 @@ VolumeView view_volume_bytes(std::string bytes, const std::string& name,
 
 FilledSurface fill_surface(const TriangleMesh& mesh, const std::string& name,
                            const SurfaceFilling& filling, const Context& context) {
-  return at(name, [&] {
+  return gewebe::at(name, [&] {
     FilledSurface filled;
     function_named<decltype(gewebe_fill_surface)>("gewebe_fill_surface")(&mesh, &name, &filling,
                                                                          &context, &filled);
@@ -63,4 +64,4 @@ FilledSurface fill_surface(const TriangleMesh& mesh, const std::string& name,
   });
 }
 
-} // namespace gewebe
+} // namespace gewebe::formats

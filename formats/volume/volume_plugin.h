@@ -14,12 +14,13 @@
 #include <string>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::formats {
 
 /// volume_from_bytes (formats/volume/volume_file.h) and view_volume. \throw Error with place `name`
 /// for what they throw, and if the library is missing or of another version
-VolumeView view_volume_bytes(std::string bytes, const std::string& name,
-                             const VolumeViewOptions& options, const Context& context);
+shading::VolumeView view_volume_bytes(std::string bytes, const std::string& name,
+                                      const shading::VolumeViewOptions& options,
+                                      const Context& context);
 
 /// How a surface is filled.
 struct SurfaceFilling {
@@ -27,9 +28,10 @@ struct SurfaceFilling {
   unsigned grade = 0;         ///< as in StuffingOptions
   /// Parts of the mesh that are bodies of their own, different ones. Each must have triangles.
   std::vector<std::int32_t> parts = {};
-  VoxelRule rule = VoxelRule::parity;
-  OpenMesh on_open = OpenMesh::refuse;
-  std::vector<RefinedRegion> refine = {}; ///< as in StuffingOptions; not with parts of their own
+  voxelization::VoxelRule rule = voxelization::VoxelRule::parity;
+  voxelization::OpenMesh on_open = voxelization::OpenMesh::refuse;
+  std::vector<tetrahedra::RefinedRegion> refine =
+      {}; ///< as in StuffingOptions; not with parts of their own
 };
 
 /// Tetrahedra that fill a surface: jones_density (antialiasing/distance_ramp.h) on voxels at
@@ -38,7 +40,7 @@ struct FilledSurface {
   /// Without parts of their own without materials; else a tetrahedron has as material the place in
   /// `parts` of that with the least volume of those that hold it, or their number. Faces follow the
   /// interfaces.
-  TetMesh mesh;
+  tetrahedra::TetMesh mesh;
   /// Of each part of its own, then of all others together, if there are any: of its surface and of
   /// the tetrahedra in it, whatever their material, mm³. Without parts of their own: of all.
   struct Volume {
@@ -46,11 +48,11 @@ struct FilledSurface {
   };
   std::vector<Volume> volumes;
   /// What was found in these bodies, in the same order: holes, faces that were turned.
-  std::vector<VoxelizeReport> found;
+  std::vector<voxelization::VoxelizeReport> found;
 };
 /// \throw Error as they, with place `name`, and as above; each part of its own, and the others
 /// together, must be closed unless `rule` and `on_open` allow holes
 FilledSurface fill_surface(const TriangleMesh& mesh, const std::string& name,
                            const SurfaceFilling& filling, const Context& context);
 
-} // namespace gewebe
+} // namespace gewebe::formats

@@ -45,22 +45,23 @@ TriangleMesh triangles_of(const TriangleMesh& mesh, const std::vector<std::int32
 struct Body {
   std::int32_t material = 0;
   double volume = 0;
-  Grid density;
-  VoxelizeReport found;
+  volume::Grid density;
+  voxelization::VoxelizeReport found;
 };
 
-FilledSurface fill(const TriangleMesh& mesh, const SurfaceFilling& filling,
-                   const Context& context) {
+formats::FilledSurface fill(const TriangleMesh& mesh, const formats::SurfaceFilling& filling,
+                            const Context& context) {
   std::vector<Body> bodies;
   const auto add = [&](const TriangleMesh& of, std::size_t material) {
     Body body;
     body.material = static_cast<std::int32_t>(material);
-    CoverageReport report;
-    body.density = jones_density(context, of, uniform_transform(filling.voxel), filling.on_open,
-                                 &report, filling.rule);
+    antialiasing::CoverageReport report;
+    body.density =
+        antialiasing::jones_density(context, of, volume::uniform_transform(filling.voxel),
+                                    filling.on_open, &report, filling.rule);
     body.found = report.mesh;
     // The signed volume of a surface with holes or turned faces says nothing.
-    body.volume = filling.rule == VoxelRule::parity && report.mesh.boundary_edges == 0
+    body.volume = filling.rule == voxelization::VoxelRule::parity && report.mesh.boundary_edges == 0
                       ? std::abs(signed_volume(of))
                       : report.volume;
     bodies.push_back(std::move(body));
@@ -75,27 +76,28 @@ FilledSurface fill(const TriangleMesh& mesh, const SurfaceFilling& filling,
     }
   if (const TriangleMesh rest = triangles_of(mesh, filling.parts, false); !rest.triangles.empty())
     add(rest, filling.parts.size());
-  StuffingOptions options{
+  stuffing::StuffingOptions options{
       .isovalue = {}, .cell = filling.cell, .grade = filling.grade, .refine = filling.refine};
   if (filling.parts.empty()) {
-    FilledSurface filled{stuff(context, bodies[0].density, options), {}, {bodies[0].found}};
-    filled.volumes.push_back({bodies[0].volume, volume(filled.mesh)});
+    formats::FilledSurface filled{
+        stuffing::stuff(context, bodies[0].density, options), {}, {bodies[0].found}};
+    filled.volumes.push_back({bodies[0].volume, tetrahedra::volume(filled.mesh)});
     return filled;
   }
   std::vector<std::size_t> by_volume(bodies.size());
   std::iota(by_volume.begin(), by_volume.end(), std::size_t{0});
   std::ranges::stable_sort(by_volume, {}, [&](std::size_t b) { return bodies[b].volume; });
-  std::vector<MaterialSource> inside;
-  std::vector<CsgOperand> operands;
+  std::vector<stuffing::MaterialSource> inside;
+  std::vector<volume::CsgOperand> operands;
   for (const std::size_t b : by_volume) {
-    inside.push_back(inside_source(bodies[b].density));
+    inside.push_back(stuffing::inside_source(bodies[b].density));
     operands.push_back({bodies[b].density, "a part"});
   }
   options.follow_interface = true;
   // Where the smooth boundary of all goes a little beyond that of each, the largest one is near.
-  options.materials = [&]() -> MaterialAt {
-    std::vector<MaterialAt> holds;
-    for (const MaterialSource& one : inside)
+  options.materials = [&]() -> stuffing::MaterialAt {
+    std::vector<stuffing::MaterialAt> holds;
+    for (const stuffing::MaterialSource& one : inside)
       holds.push_back(one());
     return [&bodies, &by_volume, holds](const Vec3& place) {
       for (std::size_t k = 0; k < holds.size(); ++k)
@@ -104,20 +106,21 @@ FilledSurface fill(const TriangleMesh& mesh, const SurfaceFilling& filling,
       return bodies[by_volume.back()].material;
     };
   };
-  const Grid all = operands.size() == 1 ? bodies[0].density
-                                        : csg(context, CsgOperation::unite, std::move(operands));
-  FilledSurface filled{stuff(context, all, options), {}, {}};
+  const volume::Grid all =
+      operands.size() == 1 ? bodies[0].density
+                           : volume::csg(context, volume::CsgOperation::unite, std::move(operands));
+  formats::FilledSurface filled{stuffing::stuff(context, all, options), {}, {}};
   for (std::size_t b = 0; b < bodies.size(); ++b) {
     filled.found.push_back(bodies[b].found);
-    TetMesh in = filled.mesh;
-    set_materials(context, inside_source(bodies[b].density), in);
-    FilledSurface::Volume& told = filled.volumes.emplace_back();
+    tetrahedra::TetMesh in = filled.mesh;
+    stuffing::set_materials(context, stuffing::inside_source(bodies[b].density), in);
+    formats::FilledSurface::Volume& told = filled.volumes.emplace_back();
     told.of_surface = bodies[b].volume;
     for (std::size_t t = 0; t < in.tetrahedra.size(); ++t)
       if (in.material[t] != 0) {
         const Tetrahedron& c = in.tetrahedra[t];
-        told.filled +=
-            tetrahedron_volume(in.points[c[0]], in.points[c[1]], in.points[c[2]], in.points[c[3]]);
+        told.filled += tetrahedra::tetrahedron_volume(in.points[c[0]], in.points[c[1]],
+                                                      in.points[c[2]], in.points[c[3]]);
       }
   }
   return filled;
@@ -128,14 +131,14 @@ FilledSurface fill(const TriangleMesh& mesh, const SurfaceFilling& filling,
 const char* const gewebe_volume_version = GEWEBE_VERSION;
 
 void gewebe_view_volume(std::string* bytes, const std::string* name,
-                        const VolumeViewOptions* options, const Context* context,
-                        VolumeView* view) {
-  const Grid grid = volume_from_bytes(*bytes, *name, *context);
-  *view = at(*name, [&] { return view_volume(grid, *options, *context); });
+                        const shading::VolumeViewOptions* options, const Context* context,
+                        shading::VolumeView* view) {
+  const volume::Grid grid = formats::volume_from_bytes(*bytes, *name, *context);
+  *view = at(*name, [&] { return shading::view_volume(grid, *options, *context); });
 }
 
 void gewebe_fill_surface(const TriangleMesh* mesh, const std::string* name,
-                         const SurfaceFilling* filling, const Context* context,
-                         FilledSurface* filled) {
+                         const formats::SurfaceFilling* filling, const Context* context,
+                         formats::FilledSurface* filled) {
   *filled = at(*name, [&] { return fill(*mesh, *filling, *context); });
 }

@@ -12,9 +12,9 @@
 extern "C" {
 extern const char* const gewebe_volume_version;
 void gewebe_view_volume(std::string* bytes, const std::string* name,
-                        const gewebe::VolumeViewOptions* options, const gewebe::Context* context,
-                        gewebe::VolumeView* view);
+                        const gewebe::shading::VolumeViewOptions* options,
+                        const gewebe::Context* context, gewebe::shading::VolumeView* view);
 void gewebe_fill_surface(const gewebe::TriangleMesh* mesh, const std::string* name,
-                         const gewebe::SurfaceFilling* filling, const gewebe::Context* context,
-                         gewebe::FilledSurface* filled);
+                         const gewebe::formats::SurfaceFilling* filling,
+                         const gewebe::Context* context, gewebe::formats::FilledSurface* filled);
 }

@@ -10,7 +10,7 @@
 #include <array>
 #include <cmath>
 
-namespace gewebe {
+namespace gewebe::antialiasing {
 namespace {
 
 /// Faces closer than this touch, in voxels; and how far from a face its two sides are judged.
@@ -106,7 +106,7 @@ private:
     for (int axis = 0; axis < 3; ++axis)
       if (face.box.min[axis] > p_[axis] + reach_ || face.box.max[axis] < p_[axis] - reach_)
         return;
-    face.nearest = nearest_on_triangle(p_, a, b, c).point;
+    face.nearest = mesh::nearest_on_triangle(p_, a, b, c).point;
     face.squared = dot(p_ - face.nearest, p_ - face.nearest);
     if (!(face.squared < reach_ * reach_))
       return;
@@ -283,10 +283,10 @@ private:
 
 OrientedFaces orient_faces(std::span<const Vec3> points, std::span<const Triangle> triangles,
                            std::span<const std::int32_t> part) {
-  const OrientedSurface surface = orient_surface(points, triangles, part);
+  const repair::OrientedSurface surface = repair::orient_surface(points, triangles, part);
   DisjointSets patches(surface.triangles.size());
-  EdgeSides(points.size(), surface.triangles)
-      .for_each_edge([&](std::uint32_t, std::span<const EdgeSide> edge) {
+  mesh::EdgeSides(points.size(), surface.triangles)
+      .for_each_edge([&](std::uint32_t, std::span<const mesh::EdgeSide> edge) {
         if (edge.size() == 2)
           patches.join(edge[0].face(), edge[1].face());
       });
@@ -307,4 +307,4 @@ std::optional<BoundaryPoint> nearest_boundary(std::span<const Vec3> points,
   return BoundarySearch(points, faces, p, winding, near, reach).find();
 }
 
-} // namespace gewebe
+} // namespace gewebe::antialiasing

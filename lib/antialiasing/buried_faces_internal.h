@@ -9,7 +9,7 @@
 #include <span>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::antialiasing {
 
 /// A mesh with the orientation of the winding rule (orient_surface).
 struct OrientedFaces {
@@ -38,4 +38,4 @@ std::optional<BoundaryPoint> nearest_boundary(std::span<const Vec3> points,
                                               int winding, std::span<const std::uint32_t> near,
                                               double reach);
 
-} // namespace gewebe
+} // namespace gewebe::antialiasing

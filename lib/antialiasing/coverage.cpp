@@ -3,9 +3,7 @@
 #include "antialiasing/coverage_internal.h"
 #include "base/error.h"
 #include "base/parallel.h"
-#include "mesh/border.h"
 #include "voxelization/ray_crossings.h"
-#include "voxelization/voxelize_input.h"
 
 #include <algorithm>
 #include <cmath>
@@ -16,14 +14,14 @@
 #include <string>
 #include <utility>
 
-namespace gewebe {
+namespace gewebe::antialiasing {
 namespace {
 
 constexpr double index_limit = 1 << 30;
 
 /// Values of a leaf that is not constant.
 struct ValueLeaf {
-  std::array<float, leaf_voxels> values;
+  std::array<float, volume::leaf_voxels> values;
   std::array<std::uint64_t, 8> active;
 };
 
@@ -200,7 +198,8 @@ private:
 };
 
 /// Adds the runs as tiles of 8³ and, where all 256 columns of a node of 128³ are full, of 128³.
-void add_tiles(const std::vector<ValueSlab>& slabs, std::int32_t first_slab, GridBuilder& builder) {
+void add_tiles(const std::vector<ValueSlab>& slabs, std::int32_t first_slab,
+               volume::GridBuilder& builder) {
   std::vector<Int3> covered;
   for (std::size_t s = 0; s < slabs.size(); ++s)
     for (const FullRun& run : slabs[s].runs)
@@ -265,22 +264,8 @@ DifferenceLeaf& DifferenceLeaves::find(LeafPlace place) {
   return *last_;
 }
 
-void close_or_refuse(const Context& context, const TriangleMesh& mesh,
-                     const GridTransform& transform, OpenMesh on_open, std::vector<Vec3>& points,
-                     std::vector<Triangle>& triangles, VoxelizeReport& report) {
-  const auto border = odd_edges(points, triangles);
-  report.boundary_edges = border.size();
-  if (border.empty())
-    return;
-  std::vector<std::uint32_t> group;
-  report.holes = edge_groups(border, group);
-  if (on_open == OpenMesh::refuse)
-    scan_inside(context, mesh, transform, {}); // refuses it, with the number of odd rays
-  if (on_open == OpenMesh::fill)
-    close_with_cones(border, points, triangles);
-}
-
-std::vector<Vec3> coverage_points(const TriangleMesh& mesh, const GridTransform& transform) {
+std::vector<Vec3> coverage_points(const TriangleMesh& mesh,
+                                  const volume::GridTransform& transform) {
   std::vector<Vec3> points(mesh.points.size());
   for (std::size_t n = 0; n < points.size(); ++n) {
     const Vec3 p = transform.to_index(mesh.points[n]);
@@ -306,7 +291,8 @@ void sort_into_slabs(const Context& context, SlabbedMesh& mesh, double margin) {
     const Triangle& t = mesh.triangles[n];
     const double a = mesh.points[t[0]].x, b = mesh.points[t[1]].x, c = mesh.points[t[2]].x;
     const double x_min = std::min(std::min(a, b), c), x_max = std::max(std::max(a, b), c);
-    slabs_of[n] = {floor_int(x_min - margin) >> 3, floor_int(x_max + margin) >> 3};
+    slabs_of[n] = {voxelization::floor_int(x_min - margin) >> 3,
+                   voxelization::floor_int(x_max + margin) >> 3};
     low = std::min(low, slabs_of[n].first);
     high = std::max(high, slabs_of[n].last);
     total += static_cast<std::size_t>(slabs_of[n].last - slabs_of[n].first + 1);
@@ -328,9 +314,9 @@ void sort_into_slabs(const Context& context, SlabbedMesh& mesh, double margin) {
   for_each_pair([&](std::size_t slab, std::uint32_t n) { mesh.members[next[slab]++] = n; });
 }
 
-Grid sum_slabs(const Context& context, const SlabbedMesh& mesh, const GridTransform& transform,
-               SumRule rule, CoverageReport& report,
-               const std::function<void(std::size_t, DifferenceLeaves&)>& fill) {
+volume::Grid sum_slabs(const Context& context, const SlabbedMesh& mesh,
+                       const volume::GridTransform& transform, SumRule rule, CoverageReport& report,
+                       const std::function<void(std::size_t, DifferenceLeaves&)>& fill) {
   MemoryAccount memory(context, "the voxelized mesh");
   std::vector<ValueSlab> slabs(mesh.slab_begin.size() - 1);
   std::optional<LeavesPool> pool(std::in_place, memory);
@@ -343,17 +329,18 @@ Grid sum_slabs(const Context& context, const SlabbedMesh& mesh, const GridTransf
     }
   });
   pool.reset();
-  GridInfo info;
+  volume::GridInfo info;
   info.transform = transform;
-  GridBuilder builder(info);
+  volume::GridBuilder builder(info);
   add_tiles(slabs, mesh.first_slab, builder);
   std::vector<Int3> origins;
   std::vector<const ValueLeaf*> values;
   double winding = 0, inside = 0;
   for (std::size_t s = 0; s < slabs.size(); ++s) {
-    const std::int32_t i = (mesh.first_slab + static_cast<std::int32_t>(s)) * leaf_dim;
+    const std::int32_t i = (mesh.first_slab + static_cast<std::int32_t>(s)) * volume::leaf_dim;
     for (std::size_t n = 0; n < slabs[s].places.size(); ++n) {
-      origins.push_back({i, slabs[s].places[n].j * leaf_dim, slabs[s].places[n].k * leaf_dim});
+      origins.push_back(
+          {i, slabs[s].places[n].j * volume::leaf_dim, slabs[s].places[n].k * volume::leaf_dim});
       values.push_back(&slabs[s].leaves[n]);
     }
     report.surface_voxels += slabs[s].surface_voxels;
@@ -364,7 +351,7 @@ Grid sum_slabs(const Context& context, const SlabbedMesh& mesh, const GridTransf
   const double voxel = std::fabs(transform.determinant());
   report.volume = inside * voxel;
   report.winding_volume = winding * voxel;
-  const std::vector<LeafRef> leaves = builder.add_leaves(context, origins);
+  const std::vector<volume::LeafRef> leaves = builder.add_leaves(context, origins);
   parallel_blocks(context, leaves.size(), 256, [&](std::size_t begin, std::size_t end) {
     for (std::size_t n = begin; n < end; ++n) {
       std::ranges::copy(values[n]->values, leaves[n].values);
@@ -374,8 +361,9 @@ Grid sum_slabs(const Context& context, const SlabbedMesh& mesh, const GridTransf
   return builder.finish(false);
 }
 
-double coverage_bytes(const TriangleMesh& mesh, const GridTransform& transform) {
-  return voxelize_bytes(mesh, transform, 2) + 100.0 * static_cast<double>(mesh.triangles.size());
+double coverage_bytes(const TriangleMesh& mesh, const volume::GridTransform& transform) {
+  return voxelization::voxelize_bytes(mesh, transform, 2) +
+         100.0 * static_cast<double>(mesh.triangles.size());
 }
 
-} // namespace gewebe
+} // namespace gewebe::antialiasing

@@ -11,15 +11,15 @@
 #include <cstdint>
 #include <optional>
 
-namespace gewebe {
+namespace gewebe::antialiasing {
 
 /// What was summed. Volumes are sums in double before the values become float.
 struct CoverageReport {
-  VoxelizeReport mesh;              ///< of the mesh; rays and crossings of `line_coverage` alone
-  std::uint64_t surface_voxels = 0; ///< a piece of the surface lies in them
-  std::uint64_t overlap_voxels = 0; ///< of these, whose winding numbers leave [0, 1]: folded
-  double volume = 0;                ///< mm³: of the values
-  double winding_volume = 0;        ///< mm³: of the winding numbers, the mesh's signed volume
+  voxelization::VoxelizeReport mesh; ///< of the mesh; rays and crossings of `line_coverage` alone
+  std::uint64_t surface_voxels = 0;  ///< a piece of the surface lies in them
+  std::uint64_t overlap_voxels = 0;  ///< of these, whose winding numbers leave [0, 1]: folded
+  double volume = 0;                 ///< mm³: of the values
+  double winding_volume = 0;         ///< mm³: of the winding numbers, the mesh's signed volume
 };
 
 /// The fraction of each voxel's volume that is inside, exact up to rounding (1e-12): each triangle
@@ -34,17 +34,19 @@ struct CoverageReport {
 /// Nothing, `report.mesh` filled, if the mesh has boundary edges (after `fill` it has none) or no
 /// orientation (orient_closed). \pre, \throw as scan_inside, the open mesh that is to be refused
 /// included
-std::optional<Grid> exact_coverage(const Context& context, const TriangleMesh& mesh,
-                                   const GridTransform& transform, OpenMesh on_open,
-                                   CoverageReport* report = nullptr);
+std::optional<volume::Grid> exact_coverage(const Context& context, const TriangleMesh& mesh,
+                                           const volume::GridTransform& transform,
+                                           voxelization::OpenMesh on_open,
+                                           CoverageReport* report = nullptr);
 
 /// The mean over rays² rays along k, spread evenly over each voxel, of the length inside, exact
 /// along each ray. Rays with an odd number of crossings count as outside. Error of a voxel:
 /// O(1/rays) of the area in it that is steep to k. 1 <= rays <= 64. \pre, \throw as scan_inside
-Grid line_coverage(const Context& context, const TriangleMesh& mesh, const GridTransform& transform,
-                   int rays, OpenMesh on_open, CoverageReport* report = nullptr);
+volume::Grid line_coverage(const Context& context, const TriangleMesh& mesh,
+                           const volume::GridTransform& transform, int rays,
+                           voxelization::OpenMesh on_open, CoverageReport* report = nullptr);
 
 /// Bytes that either will need at most for meshes of ordinary shape.
-double coverage_bytes(const TriangleMesh& mesh, const GridTransform& transform);
+double coverage_bytes(const TriangleMesh& mesh, const volume::GridTransform& transform);
 
-} // namespace gewebe
+} // namespace gewebe::antialiasing

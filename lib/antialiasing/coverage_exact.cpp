@@ -14,7 +14,7 @@
 #include <algorithm>
 #include <array>
 
-namespace gewebe {
+namespace gewebe::antialiasing {
 namespace {
 
 /// A corner, padded so that it is copied in two moves.
@@ -77,7 +77,7 @@ void split(const Polygon& whole, double h, Polygon& below, Polygon& above) {
 template <std::size_t axis, class Visit>
 void for_each_cell(Polygon& rest, Visit&& visit) {
   const Polygon::Range range = rest.range(axis);
-  std::int32_t cell = floor_int(range.min);
+  std::int32_t cell = voxelization::floor_int(range.min);
   if (range.max <= cell + 1) { // the usual case
     visit(cell, rest);
     return;
@@ -101,17 +101,18 @@ class SlabClipper {
 public:
   SlabClipper(const SlabbedMesh& mesh, std::size_t slab, DifferenceLeaves& leaves)
       : mesh_(mesh), leaves_(leaves),
-        first_row_((mesh.first_slab + static_cast<std::int32_t>(slab)) * leaf_dim) {}
+        first_row_((mesh.first_slab + static_cast<std::int32_t>(slab)) * volume::leaf_dim) {}
 
   void add(const Triangle& t) {
     const Vec3 &a = mesh_.points[t[0]], &b = mesh_.points[t[1]], &c = mesh_.points[t[2]];
     // From here on relative to a voxel nearby, which loses no bits.
     for (int axis = 0; axis < 3; ++axis)
-      base_[static_cast<std::size_t>(axis)] = floor_int(std::min({a[axis], b[axis], c[axis]}));
+      base_[static_cast<std::size_t>(axis)] =
+          voxelization::floor_int(std::min({a[axis], b[axis], c[axis]}));
     Polygon whole, cut, outside;
     for (const Vec3* p : {&a, &b, &c})
       whole.corners[whole.count++].at = {p->x - base_[0], p->y - base_[1], p->z - base_[2], 0};
-    const std::int32_t begin = first_row_ - base_[0], end = begin + leaf_dim;
+    const std::int32_t begin = first_row_ - base_[0], end = begin + volume::leaf_dim;
     if (whole.range(0).max > end) {
       split<0>(whole, end, cut, outside);
       whole = cut;
@@ -123,7 +124,7 @@ public:
     if (whole.count < 3)
       return;
     for_each_cell<0>(whole, [&](std::int32_t i, Polygon& row) {
-      const auto in_slab = static_cast<std::size_t>(std::clamp(i - begin, 0, leaf_dim - 1));
+      const auto in_slab = static_cast<std::size_t>(std::clamp(i - begin, 0, volume::leaf_dim - 1));
       for_each_cell<1>(
           row, [&](std::int32_t j, Polygon& column) { add_column(in_slab, j + base_[1], column); });
     });
@@ -133,8 +134,8 @@ private:
   /// Adds a polygon that lies in one column of voxels.
   void add_column(std::size_t i, std::int32_t j, const Polygon& polygon) {
     const Polygon::Range range = polygon.range(2);
-    const std::int32_t bottom = floor_int(range.min);
-    const std::int32_t top = std::max(ceil_int(range.max) - 1, bottom);
+    const std::int32_t bottom = voxelization::floor_int(range.min);
+    const std::int32_t top = std::max(voxelization::ceil_int(range.max) - 1, bottom);
     const std::size_t column = 8 * i + static_cast<std::size_t>(j & 7);
     const auto add = [&](std::int32_t k, double volume, double area) {
       k += base_[2];
@@ -200,10 +201,10 @@ private:
 
 } // namespace
 
-std::optional<Grid> exact_coverage(const Context& context, const TriangleMesh& mesh,
-                                   const GridTransform& transform, OpenMesh on_open,
-                                   CoverageReport* report) {
-  check_voxelize_input(mesh, transform);
+std::optional<volume::Grid> exact_coverage(const Context& context, const TriangleMesh& mesh,
+                                           const volume::GridTransform& transform,
+                                           voxelization::OpenMesh on_open, CoverageReport* report) {
+  voxelization::check_voxelize_input(mesh, transform);
   require_memory(context, coverage_bytes(mesh, transform), "the voxelized mesh");
   CoverageReport local;
   CoverageReport& r = report != nullptr ? *report : local;
@@ -212,9 +213,10 @@ std::optional<Grid> exact_coverage(const Context& context, const TriangleMesh& m
   SlabbedMesh slabbed;
   slabbed.points = coverage_points(mesh, transform);
   slabbed.triangles = mesh.triangles;
-  if (!orient_closed(slabbed.points, slabbed.triangles)) {
-    close_or_refuse(context, mesh, transform, on_open, slabbed.points, slabbed.triangles, r.mesh);
-    if (!orient_closed(slabbed.points, slabbed.triangles))
+  if (!repair::orient_closed(slabbed.points, slabbed.triangles)) {
+    voxelization::close_or_refuse(context, mesh, transform, on_open, slabbed.points,
+                                  slabbed.triangles, r.mesh);
+    if (!repair::orient_closed(slabbed.points, slabbed.triangles))
       return std::nullopt;
   }
   sort_into_slabs(context, slabbed);
@@ -227,4 +229,4 @@ std::optional<Grid> exact_coverage(const Context& context, const TriangleMesh& m
                    });
 }
 
-} // namespace gewebe
+} // namespace gewebe::antialiasing

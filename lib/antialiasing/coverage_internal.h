@@ -17,7 +17,7 @@
 #include <functional>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::antialiasing {
 
 /// A leaf of differences along k. Entry 8 of a column goes to the leaf above.
 struct DifferenceLeaf {
@@ -81,15 +81,15 @@ struct SlabbedMesh {
 };
 
 /// Points moved to index space and by ½. \throw Error if one would leave ±2^30
-std::vector<Vec3> coverage_points(const TriangleMesh& mesh, const GridTransform& transform);
+std::vector<Vec3> coverage_points(const TriangleMesh& mesh, const volume::GridTransform& transform);
 
 /// Fills the slabs of `mesh`. Triangles whose box, widened by `margin`, meets no voxel's slab are
 /// in none.
 void sort_into_slabs(const Context& context, SlabbedMesh& mesh, double margin = 0);
 
 /// Calls `fill(slab, leaves)` for each slab, in parallel, sums along k and builds the volume.
-Grid sum_slabs(const Context& context, const SlabbedMesh& mesh, const GridTransform& transform,
-               SumRule rule, CoverageReport& report,
-               const std::function<void(std::size_t slab, DifferenceLeaves& leaves)>& fill);
+volume::Grid sum_slabs(const Context& context, const SlabbedMesh& mesh,
+                       const volume::GridTransform& transform, SumRule rule, CoverageReport& report,
+                       const std::function<void(std::size_t slab, DifferenceLeaves& leaves)>& fill);
 
-} // namespace gewebe
+} // namespace gewebe::antialiasing

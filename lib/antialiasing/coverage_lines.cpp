@@ -14,7 +14,7 @@
 #include <string>
 #include <utility>
 
-namespace gewebe {
+namespace gewebe::antialiasing {
 namespace {
 
 /// Where an edge meets the plane of a row of rays.
@@ -29,12 +29,12 @@ EdgePlace place_on_edge(const Vec3& p, const Vec3& q, std::int32_t i, std::uint6
   const double t = (i - p.x) / (q.x - p.x);
   const double y = p.y + t * (q.y - p.y), z = p.z + t * (q.z - p.z);
   const double error = 0x1p-49 * (std::fabs(p.y) + std::fabs(q.y - p.y));
-  const std::int32_t below = floor_int(y);
+  const std::int32_t below = voxelization::floor_int(y);
   const double rest = y - below;
   if (rest > error && rest < 1 - error)
     return {below + 1, y, z};
   const std::int32_t nearest = rest < 0.5 ? below : below + 1;
-  return {past_edge(p, q, i, nearest, exact_tests) ? nearest : nearest + 1, y, z};
+  return {voxelization::past_edge(p, q, i, nearest, exact_tests) ? nearest : nearest + 1, y, z};
 }
 
 /// Calls `emit(i, j, z)` for each ray (i, j) with row_begin <= i < row_end that crosses the
@@ -48,8 +48,8 @@ void heights_on_triangle(Vec3 a, Vec3 b, Vec3 c, std::int32_t row_begin, std::in
     std::swap(b, c);
   if (b.x < a.x)
     std::swap(a, b);
-  row_begin = std::max(row_begin, ceil_int(a.x));
-  row_end = std::min(row_end, ceil_int(c.x));
+  row_begin = std::max(row_begin, voxelization::ceil_int(a.x));
+  row_end = std::min(row_end, voxelization::ceil_int(c.x));
   for (std::int32_t i = row_begin; i < row_end; ++i) {
     const EdgePlace long_edge = place_on_edge(a, c, i, exact_tests);
     const EdgePlace short_edge =
@@ -97,7 +97,7 @@ public:
 
 private:
   void add(std::size_t i, std::int32_t j, double z, double area) {
-    const std::int32_t k = floor_int(z);
+    const std::int32_t k = voxelization::floor_int(z);
     leaves_.at({j >> 3, k >> 3})
         .add(8 * i + static_cast<std::size_t>(j & 7), static_cast<std::size_t>(k & 7),
              area * (k + 1 - z), area);
@@ -109,11 +109,12 @@ private:
 
 } // namespace
 
-Grid line_coverage(const Context& context, const TriangleMesh& mesh, const GridTransform& transform,
-                   int rays, OpenMesh on_open, CoverageReport* report) {
+volume::Grid line_coverage(const Context& context, const TriangleMesh& mesh,
+                           const volume::GridTransform& transform, int rays,
+                           voxelization::OpenMesh on_open, CoverageReport* report) {
   if (rays < 1 || rays > 64)
     throw Error("voxelize: " + std::to_string(rays) + " rays along an edge, expected 1 to 64");
-  check_voxelize_input(mesh, transform);
+  voxelization::check_voxelize_input(mesh, transform);
   require_memory(context, coverage_bytes(mesh, transform), "the voxelized mesh");
   CoverageReport local;
   CoverageReport& r = report != nullptr ? *report : local;
@@ -122,7 +123,8 @@ Grid line_coverage(const Context& context, const TriangleMesh& mesh, const GridT
   SlabbedMesh slabbed;
   slabbed.points = coverage_points(mesh, transform);
   slabbed.triangles = mesh.triangles;
-  close_or_refuse(context, mesh, transform, on_open, slabbed.points, slabbed.triangles, r.mesh);
+  voxelization::close_or_refuse(context, mesh, transform, on_open, slabbed.points,
+                                slabbed.triangles, r.mesh);
   sort_into_slabs(context, slabbed);
   // Rays lie at ((a + ½)/rays) in each voxel: whole numbers of x rays - ½.
   std::vector<Vec3> fine(slabbed.points.size());
@@ -134,17 +136,18 @@ Grid line_coverage(const Context& context, const TriangleMesh& mesh, const GridT
       throw Error("point " + std::to_string(n) +
                   " lies 2^30 rays or more from the lattice's origin: choose a larger voxel");
   }
-  std::vector<VoxelizeReport> counts(slabbed.slab_begin.size() - 1);
-  Grid grid = sum_slabs(
+  std::vector<voxelization::VoxelizeReport> counts(slabbed.slab_begin.size() - 1);
+  volume::Grid grid = sum_slabs(
       context, slabbed, transform, SumRule::clamp, r,
       [&](std::size_t slab, DifferenceLeaves& leaves) {
         constexpr std::int32_t rows_at_once = 64;
         SlabLines lines(rays, leaves);
         const std::int32_t first =
-            (slabbed.first_slab + static_cast<std::int32_t>(slab)) * leaf_dim * rays;
+            (slabbed.first_slab + static_cast<std::int32_t>(slab)) * volume::leaf_dim * rays;
         std::array<std::vector<Crossing>, rows_at_once> rows;
-        for (std::int32_t row = first; row < first + leaf_dim * rays; row += rows_at_once) {
-          const std::int32_t row_end = std::min(first + leaf_dim * rays, row + rows_at_once);
+        for (std::int32_t row = first; row < first + volume::leaf_dim * rays; row += rows_at_once) {
+          const std::int32_t row_end =
+              std::min(first + volume::leaf_dim * rays, row + rows_at_once);
           for (std::size_t n = slabbed.slab_begin[slab]; n < slabbed.slab_begin[slab + 1]; ++n) {
             const Triangle& t = slabbed.triangles[slabbed.members[n]];
             heights_on_triangle(fine[t[0]], fine[t[1]], fine[t[2]], row, row_end,
@@ -162,7 +165,7 @@ Grid line_coverage(const Context& context, const TriangleMesh& mesh, const GridT
           }
         }
       });
-  for (const VoxelizeReport& c : counts) {
+  for (const voxelization::VoxelizeReport& c : counts) {
     r.mesh.crossings += c.crossings;
     r.mesh.odd_rays += c.odd_rays;
     r.mesh.exact_tests += c.exact_tests;
@@ -170,4 +173,4 @@ Grid line_coverage(const Context& context, const TriangleMesh& mesh, const GridT
   return grid;
 }
 
-} // namespace gewebe
+} // namespace gewebe::antialiasing

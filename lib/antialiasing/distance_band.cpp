@@ -10,13 +10,13 @@
 #include <memory>
 #include <utility>
 
-namespace gewebe {
+namespace gewebe::antialiasing {
 namespace {
 
 /// Nearest triangles of a leaf's voxels.
 struct BandLeaf {
-  std::array<double, leaf_voxels> squared;
-  std::array<std::uint32_t, leaf_voxels> triangle;
+  std::array<double, volume::leaf_voxels> squared;
+  std::array<std::uint32_t, volume::leaf_voxels> triangle;
   // By the winding rule alone:
   std::array<std::uint64_t, 8> several{}; ///< bits: triangles of several patches are near
   std::vector<std::uint32_t> near;        ///< triangles that are near voxels of the leaf
@@ -45,11 +45,11 @@ void offer(const SlabbedMesh& mesh, const OrientedFaces* faces, std::uint32_t n,
   Int3 low{}, high{}; // of voxels, whose centres are at the index and a half
   for (int axis = 0; axis < 3; ++axis) {
     const auto [min, max] = std::minmax({a[axis], b[axis], c[axis]});
-    low[static_cast<std::size_t>(axis)] = ceil_int(min - reach - 0.5);
-    high[static_cast<std::size_t>(axis)] = floor_int(max + reach - 0.5);
+    low[static_cast<std::size_t>(axis)] = voxelization::ceil_int(min - reach - 0.5);
+    high[static_cast<std::size_t>(axis)] = voxelization::floor_int(max + reach - 0.5);
   }
   low[0] = std::max(low[0], first_row);
-  high[0] = std::min(high[0], first_row + leaf_dim - 1);
+  high[0] = std::min(high[0], first_row + volume::leaf_dim - 1);
   Vec3 normal = cross(b - a, c - a);
   const double length = norm(normal);
   // A needle's normal may be rounding alone: then no point is passed over by its plane.
@@ -73,11 +73,11 @@ void offer(const SlabbedMesh& mesh, const OrientedFaces* faces, std::uint32_t n,
             const double to_plane = dot(normal, p - a); // no point of the triangle is nearer
             if (!(to_plane * to_plane < limit))
               continue;
-            const auto v = static_cast<std::size_t>(leaf_offset({i, j, k}));
+            const auto v = static_cast<std::size_t>(volume::leaf_offset({i, j, k}));
             if (leaf != nullptr && to_plane * to_plane > leaf->squared[v] * (1 + 1e-9) &&
                 !other_patch(v))
               continue;
-            const Vec3 offset = p - nearest_on_triangle(p, a, b, c).point;
+            const Vec3 offset = p - mesh::nearest_on_triangle(p, a, b, c).point;
             const double squared = dot(offset, offset);
             if (!(squared < limit))
               continue;
@@ -101,9 +101,9 @@ void offer(const SlabbedMesh& mesh, const OrientedFaces* faces, std::uint32_t n,
 /// Bits of the leaves of a scan, mixed or not.
 class InsideBits {
 public:
-  explicit InsideBits(const InsideScan& scan) : scan_(scan) {
-    for (const TileView& tile : scan.tiles)
-      (tile.dim == leaf_dim ? small_ : large_).push_back(tile.origin);
+  explicit InsideBits(const voxelization::InsideScan& scan) : scan_(scan) {
+    for (const volume::TileView& tile : scan.tiles)
+      (tile.dim == volume::leaf_dim ? small_ : large_).push_back(tile.origin);
     std::ranges::sort(small_);
     std::ranges::sort(large_);
   }
@@ -120,27 +120,28 @@ public:
   }
 
 private:
-  const InsideScan& scan_;
+  const voxelization::InsideScan& scan_;
   std::vector<Int3> small_, large_;
 };
 
 /// Winding numbers of the voxels of a scan by the winding rule.
 class Windings {
 public:
-  explicit Windings(const InsideScan& scan) : runs_(scan.windings) {}
+  explicit Windings(const voxelization::InsideScan& scan) : runs_(scan.windings) {}
   /// Of a leaf where others than 0 and 1 occur; null elsewhere.
-  const WindingRun* of(const Int3& origin) const {
-    const auto next = std::ranges::upper_bound(runs_, origin, {}, &WindingRun::origin);
+  const voxelization::WindingRun* of(const Int3& origin) const {
+    const auto next =
+        std::ranges::upper_bound(runs_, origin, {}, &voxelization::WindingRun::origin);
     if (next == runs_.begin())
       return nullptr;
-    const WindingRun& run = *(next - 1);
+    const voxelization::WindingRun& run = *(next - 1);
     const bool within =
         run.origin[0] == origin[0] && run.origin[1] == origin[1] && origin[2] < run.k_end;
     return within ? &run : nullptr;
   }
 
 private:
-  std::span<const WindingRun> runs_;
+  std::span<const voxelization::WindingRun> runs_;
 };
 
 /// What the values of all voxels are made from.
@@ -176,7 +177,7 @@ double RampSource::distance(const BandLeaf& band, std::size_t v, const Vec3& p, 
 
 struct RampLeaf {
   Int3 origin{};
-  std::array<float, leaf_voxels> values{};
+  std::array<float, volume::leaf_voxels> values{};
   std::array<std::uint64_t, 8> active{};
 };
 struct RampSlab {
@@ -186,11 +187,11 @@ struct RampSlab {
 };
 
 RampLeaf ramp_leaf(const RampSource& source, const BandLeaf* band, const Int3& origin,
-                   const std::array<std::uint64_t, 8>& inside, const WindingRun* windings,
-                   std::uint64_t& band_voxels) {
+                   const std::array<std::uint64_t, 8>& inside,
+                   const voxelization::WindingRun* windings, std::uint64_t& band_voxels) {
   RampLeaf leaf;
   leaf.origin = origin;
-  for (std::size_t v = 0; v < leaf_voxels; ++v) {
+  for (std::size_t v = 0; v < volume::leaf_voxels; ++v) {
     const bool in = (inside[v >> 6] >> (v & 63) & 1) != 0;
     double value = in ? 1 : 0;
     if (band != nullptr && band->squared[v] < HUGE_VAL) {
@@ -211,8 +212,8 @@ RampLeaf ramp_leaf(const RampSource& source, const BandLeaf* band, const Int3& o
 
 /// Adds the tiles of the scan less the leaves of `taken` (ascending); returns how many leaves that
 /// are.
-std::uint64_t add_tiles(const InsideScan& scan, const std::vector<Int3>& taken,
-                        GridBuilder& builder) {
+std::uint64_t add_tiles(const voxelization::InsideScan& scan, const std::vector<Int3>& taken,
+                        volume::GridBuilder& builder) {
   const auto node_of = [](const Int3& o) { return Int3{o[0] & ~127, o[1] & ~127, o[2] & ~127}; };
   std::vector<Int3> nodes;
   for (const Int3& origin : taken)
@@ -221,20 +222,20 @@ std::uint64_t add_tiles(const InsideScan& scan, const std::vector<Int3>& taken,
   std::uint64_t added = 0;
   const auto add_small = [&](const Int3& origin) {
     if (!std::ranges::binary_search(taken, origin)) {
-      builder.add_tile({origin, leaf_dim, 1.0f, true});
+      builder.add_tile({origin, volume::leaf_dim, 1.0f, true});
       ++added;
     }
   };
-  for (const TileView& tile : scan.tiles) {
-    if (tile.dim == leaf_dim) {
+  for (const volume::TileView& tile : scan.tiles) {
+    if (tile.dim == volume::leaf_dim) {
       add_small(tile.origin);
     } else if (!std::ranges::binary_search(nodes, tile.origin)) {
       builder.add_tile(tile);
       added += 4096;
     } else {
-      for (std::int32_t i = 0; i < tile.dim; i += leaf_dim)
-        for (std::int32_t j = 0; j < tile.dim; j += leaf_dim)
-          for (std::int32_t k = 0; k < tile.dim; k += leaf_dim)
+      for (std::int32_t i = 0; i < tile.dim; i += volume::leaf_dim)
+        for (std::int32_t j = 0; j < tile.dim; j += volume::leaf_dim)
+          for (std::int32_t k = 0; k < tile.dim; k += volume::leaf_dim)
             add_small({tile.origin[0] + i, tile.origin[1] + j, tile.origin[2] + k});
     }
   }
@@ -243,24 +244,28 @@ std::uint64_t add_tiles(const InsideScan& scan, const std::vector<Int3>& taken,
 
 } // namespace
 
-Grid ramp_density(const Context& context, const TriangleMesh& mesh, const GridTransform& transform,
-                  const VoxelizeOptions& options, double half_width,
-                  const std::function<RampDistances(const SlabbedMesh&)>& prepare,
-                  CoverageReport& report) {
+volume::Grid ramp_density(const Context& context, const TriangleMesh& mesh,
+                          const volume::GridTransform& transform,
+                          const voxelization::VoxelizeOptions& options, double half_width,
+                          const std::function<RampDistances(const SlabbedMesh&)>& prepare,
+                          CoverageReport& report) {
   report = {};
-  const bool winding = options.rule == VoxelRule::winding;
-  VoxelizeOptions scanned = options;
+  const bool winding = options.rule == voxelization::VoxelRule::winding;
+  voxelization::VoxelizeOptions scanned = options;
   scanned.keep_windings = winding;
-  const InsideScan scan = scan_inside(context, mesh, transform, scanned, &report.mesh);
+  const voxelization::InsideScan scan =
+      voxelization::scan_inside(context, mesh, transform, scanned, &report.mesh);
   // The band is wider than the surface's leaves by half_width on both sides.
   require_memory(context, 3 * coverage_bytes(mesh, transform), "the voxelized mesh");
   SlabbedMesh slabbed;
   slabbed.points = coverage_points(mesh, transform);
   slabbed.triangles = mesh.triangles;
-  VoxelizeReport holes;
-  const bool refused = options.rule == VoxelRule::parity || options.on_open != OpenMesh::refuse;
-  close_or_refuse(context, mesh, transform, refused ? options.on_open : OpenMesh::skip,
-                  slabbed.points, slabbed.triangles, holes);
+  voxelization::VoxelizeReport holes;
+  const bool refused = options.rule == voxelization::VoxelRule::parity ||
+                       options.on_open != voxelization::OpenMesh::refuse;
+  voxelization::close_or_refuse(context, mesh, transform,
+                                refused ? options.on_open : voxelization::OpenMesh::skip,
+                                slabbed.points, slabbed.triangles, holes);
   sort_into_slabs(context, slabbed, half_width);
   const RampDistances distances = prepare(slabbed);
   OrientedFaces faces;
@@ -277,7 +282,8 @@ Grid ramp_density(const Context& context, const TriangleMesh& mesh, const GridTr
   std::vector<RampSlab> slabs(slabbed.slab_begin.size() - 1);
   parallel_blocks(context, slabs.size(), 1, [&](std::size_t begin, std::size_t end) {
     for (std::size_t s = begin; s < end; ++s) {
-      const std::int32_t row = (slabbed.first_slab + static_cast<std::int32_t>(s)) * leaf_dim;
+      const std::int32_t row =
+          (slabbed.first_slab + static_cast<std::int32_t>(s)) * volume::leaf_dim;
       BandLeaves band;
       band.memory = MemoryShare(memory);
       for (std::size_t n = slabbed.slab_begin[s]; n < slabbed.slab_begin[s + 1]; ++n)
@@ -297,9 +303,9 @@ Grid ramp_density(const Context& context, const TriangleMesh& mesh, const GridTr
     }
   });
 
-  GridInfo info;
+  volume::GridInfo info;
   info.transform = transform;
-  GridBuilder builder(info);
+  volume::GridBuilder builder(info);
   std::vector<Int3> origins;
   std::vector<const RampLeaf*> values;
   double sum = 0;
@@ -314,9 +320,9 @@ Grid ramp_density(const Context& context, const TriangleMesh& mesh, const GridTr
       sum += of_leaf;
     }
   }
-  sum += static_cast<double>(add_tiles(scan, origins, builder)) * leaf_voxels;
+  sum += static_cast<double>(add_tiles(scan, origins, builder)) * volume::leaf_voxels;
   report.volume = sum * std::fabs(transform.determinant());
-  const std::vector<LeafRef> leaves = builder.add_leaves(context, origins);
+  const std::vector<volume::LeafRef> leaves = builder.add_leaves(context, origins);
   parallel_blocks(context, leaves.size(), 256, [&](std::size_t begin, std::size_t end) {
     for (std::size_t n = begin; n < end; ++n) {
       std::ranges::copy(values[n]->values, leaves[n].values);
@@ -326,4 +332,4 @@ Grid ramp_density(const Context& context, const TriangleMesh& mesh, const GridTr
   return builder.finish(false);
 }
 
-} // namespace gewebe
+} // namespace gewebe::antialiasing

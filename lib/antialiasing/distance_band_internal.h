@@ -8,7 +8,7 @@
 
 #include <functional>
 
-namespace gewebe {
+namespace gewebe::antialiasing {
 
 /// Distance of voxel centre `p`, whose nearest triangle is `triangle`, from the surface; >= 0, in
 /// voxels. Methods differ in this function.
@@ -29,9 +29,10 @@ struct RampDistances {
 /// surface, 0 or 1 elsewhere. `prepare` sees the mesh (index space moved by ½, holes closed if
 /// requested) and gives the functions for d. By the winding rule voxels inside take the distance to
 /// the boundary of the solid (nearest_boundary). \pre options.samples == 1
-Grid ramp_density(const Context& context, const TriangleMesh& mesh, const GridTransform& transform,
-                  const VoxelizeOptions& options, double half_width,
-                  const std::function<RampDistances(const SlabbedMesh&)>& prepare,
-                  CoverageReport& report);
+volume::Grid ramp_density(const Context& context, const TriangleMesh& mesh,
+                          const volume::GridTransform& transform,
+                          const voxelization::VoxelizeOptions& options, double half_width,
+                          const std::function<RampDistances(const SlabbedMesh&)>& prepare,
+                          CoverageReport& report);
 
-} // namespace gewebe
+} // namespace gewebe::antialiasing

@@ -16,7 +16,7 @@
 
 #include "antialiasing/coverage.h"
 
-namespace gewebe {
+namespace gewebe::antialiasing {
 
 /// Half the width of Jones' ramp: two samples of an edge that the surface crosses lie within one
 /// voxel of it, so both are on the ramp, and a plane is found again exactly by interpolation.
@@ -28,17 +28,19 @@ inline constexpr double sramek_half_width = 1.8;
 /// Value ½ - d/(2h), d the signed Euclidean distance to the nearest triangle, h = jones_half_width;
 /// round about edges and corners. `report.surface_voxels` counts the voxels of the band. \pre,
 /// \throw as scan_inside
-Grid jones_density(const Context& context, const TriangleMesh& mesh, const GridTransform& transform,
-                   OpenMesh on_open, CoverageReport* report = nullptr,
-                   VoxelRule rule = VoxelRule::parity);
+volume::Grid jones_density(const Context& context, const TriangleMesh& mesh,
+                           const volume::GridTransform& transform, voxelization::OpenMesh on_open,
+                           CoverageReport* report = nullptr,
+                           voxelization::VoxelRule rule = voxelization::VoxelRule::parity);
 
 /// The box filter of width 2h, h = sramek_half_width, laid along the surface's normal. For a plane
 /// this is the ramp ½ - d/(2h). A polyhedron is made of planes by intersection (its edge is convex)
 /// and union (concave), whose densities are the smaller and the larger one of both; so where the
 /// nearest point lies on an edge or a corner, d is the largest distance to the planes of the faces
 /// that meet there, and edges keep sharp. \pre, \throw as scan_inside
-Grid sramek_density(const Context& context, const TriangleMesh& mesh,
-                    const GridTransform& transform, OpenMesh on_open,
-                    CoverageReport* report = nullptr, VoxelRule rule = VoxelRule::parity);
+volume::Grid sramek_density(const Context& context, const TriangleMesh& mesh,
+                            const volume::GridTransform& transform, voxelization::OpenMesh on_open,
+                            CoverageReport* report = nullptr,
+                            voxelization::VoxelRule rule = voxelization::VoxelRule::parity);
 
-} // namespace gewebe
+} // namespace gewebe::antialiasing

@@ -12,7 +12,7 @@
 #include <numeric>
 #include <span>
 
-namespace gewebe {
+namespace gewebe::antialiasing {
 namespace {
 
 /// Unit normals, and the triangles round each point (points of equal position count as one).
@@ -22,7 +22,7 @@ struct Surroundings {
   std::vector<std::size_t> first;
   std::vector<std::uint32_t> triangles;
 
-  explicit Surroundings(const SlabbedMesh& mesh) : point(first_at_position(mesh.points)) {
+  explicit Surroundings(const SlabbedMesh& mesh) : point(mesh::first_at_position(mesh.points)) {
     for (const Triangle& t : mesh.triangles) {
       const Vec3& a = mesh.points[t[0]];
       const Vec3 n = cross(mesh.points[t[1]] - a, mesh.points[t[2]] - a);
@@ -52,8 +52,8 @@ struct Surroundings {
 double oriented_distance(const Surroundings& s, const SlabbedMesh& mesh, const Vec3& p,
                          std::uint32_t triangle) {
   const Triangle& t = mesh.triangles[triangle];
-  const NearestPoint nearest =
-      nearest_on_triangle(p, mesh.points[t[0]], mesh.points[t[1]], mesh.points[t[2]]);
+  const mesh::NearestPoint nearest =
+      mesh::nearest_on_triangle(p, mesh.points[t[0]], mesh.points[t[1]], mesh.points[t[2]]);
   const Vec3 offset = p - nearest.point;
   if (nearest.feature == 0)
     return norm(offset);
@@ -68,9 +68,9 @@ double oriented_distance(const Surroundings& s, const SlabbedMesh& mesh, const V
 
 } // namespace
 
-Grid sramek_density(const Context& context, const TriangleMesh& mesh,
-                    const GridTransform& transform, OpenMesh on_open, CoverageReport* report,
-                    VoxelRule rule) {
+volume::Grid sramek_density(const Context& context, const TriangleMesh& mesh,
+                            const volume::GridTransform& transform, voxelization::OpenMesh on_open,
+                            CoverageReport* report, voxelization::VoxelRule rule) {
   CoverageReport local;
   const auto oriented = [](const SlabbedMesh& m) -> RampDistances {
     const auto around = std::make_shared<const Surroundings>(m);
@@ -87,4 +87,4 @@ Grid sramek_density(const Context& context, const TriangleMesh& mesh,
                       report != nullptr ? *report : local);
 }
 
-} // namespace gewebe
+} // namespace gewebe::antialiasing

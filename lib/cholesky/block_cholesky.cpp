@@ -5,7 +5,7 @@
 
 #include <algorithm>
 
-namespace gewebe {
+namespace gewebe::cholesky {
 
 namespace {
 
@@ -180,4 +180,4 @@ bool invert(std::span<double> matrix, std::size_t order, CpuLevel cpu) {
   return true;
 }
 
-} // namespace gewebe
+} // namespace gewebe::cholesky

@@ -9,7 +9,7 @@
 #include <span>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::cholesky {
 
 /// Multifrontal factor of a matrix whose unknowns are in groups: a block of two groups is dense or
 /// 0. Groups are eliminated in the order of minimum degree. So the cost of a chain of groups is
@@ -43,4 +43,4 @@ private:
 /// \return whether it is positive definite; if not, the matrix is as it was
 bool invert(std::span<double> matrix, std::size_t order, CpuLevel cpu);
 
-} // namespace gewebe
+} // namespace gewebe::cholesky

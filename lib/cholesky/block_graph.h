@@ -5,7 +5,7 @@
 #include <cstdint>
 #include <span>
 
-namespace gewebe {
+namespace gewebe::cholesky {
 
 /// A view: neighbours of node i are node[start[i] … start[i + 1] - 1], in any order, both ways and
 /// without the node itself; some may be named more than once.
@@ -20,4 +20,4 @@ struct BlockGraph {
   }
 };
 
-} // namespace gewebe
+} // namespace gewebe::cholesky

@@ -14,7 +14,7 @@
 // Based on: Goto, van de Geijn, Anatomy of High-Performance Matrix Multiplication, 2008 (packed
 // strips, a tile of the result in registers).
 
-namespace gewebe {
+namespace gewebe::cholesky {
 namespace {
 
 /// A tile: rows of one strip, in so many registers, by so many columns.
@@ -65,7 +65,7 @@ struct Tile {
         row[i] = reinterpret_cast<const Unaligned*>(a)[i];
       for (std::size_t j = 0; j < tile_columns; ++j)
         for (std::size_t i = 0; i < Parts; ++i)
-          part[j][i] = gewebe::lose(part[j][i], row[i], b[j]);
+          part[j][i] = gewebe::cholesky::lose(part[j][i], row[i], b[j]);
     }
   }
   /// X L' = this, of a square with the reciprocals of its pivots.
@@ -75,7 +75,7 @@ struct Tile {
 #pragma GCC unroll 8
       for (std::size_t k = 0; k < j; ++k)
         for (std::size_t i = 0; i < Parts; ++i)
-          part[j][i] = gewebe::lose(part[j][i], part[k][i], square[k * step + j]);
+          part[j][i] = gewebe::cholesky::lose(part[j][i], part[k][i], square[k * step + j]);
       for (std::size_t i = 0; i < Parts; ++i)
         part[j][i] *= reciprocal[j];
     }
@@ -286,13 +286,16 @@ inline void update_corner(double* const* columns, std::ptrdiff_t start, std::siz
   for (std::size_t j = missing; j < strip_rows; ++j)
     for (std::size_t i = j; i < strip_rows; ++i)
       square[j][i] = columns[j][start + static_cast<std::ptrdiff_t>(i)];
-  const auto lose = [&]<std::size_t Parts>(std::size_t group, Tile<Parts> tile) {
-    constexpr std::size_t row = Parts * lanes < strip_rows ? strip_rows - Parts * lanes : 0;
-    double* into[tile_columns];
-    for (std::size_t j = 0; j < tile_columns; ++j)
+  const auto lose = [&]<std::size_t Parts>(std::size_t group, gewebe::cholesky::Tile<Parts> tile) {
+    constexpr std::size_t row = Parts * gewebe::cholesky::lanes < gewebe::cholesky::strip_rows
+                                    ? gewebe::cholesky::strip_rows - Parts * gewebe::cholesky::lanes
+                                    : 0;
+    double* into[gewebe::cholesky::tile_columns];
+    for (std::size_t j = 0; j < gewebe::cholesky::tile_columns; ++j)
       into[j] = square[group + j] + row;
     tile.load(into);
-    tile.lose(a + row, strip_rows, a + group, strip_rows, count);
+    tile.lose(a + row, gewebe::cholesky::strip_rows, a + group, gewebe::cholesky::strip_rows,
+              count);
     tile.store(into);
   };
   for (std::size_t group = missing / tile_columns * tile_columns; group < strip_rows;
@@ -367,4 +370,4 @@ inline void update(const FrontArrays& f, std::size_t begin, std::size_t count,
 }
 
 } // namespace
-} // namespace gewebe
+} // namespace gewebe::cholesky

@@ -9,7 +9,7 @@
 #include <cstddef>
 #include <span>
 
-namespace gewebe {
+namespace gewebe::cholesky {
 
 /// A front by columns: `columns` of L (see front_offset), and the lower triangle of the update
 /// matrix of `below` = rows - columns, packed: a column begins at its diagonal, right behind the
@@ -80,4 +80,4 @@ extern const FrontKernel front_kernel_baseline;
 extern const FrontKernel front_kernel_avx2;
 extern const FrontKernel front_kernel_avx512;
 
-} // namespace gewebe
+} // namespace gewebe::cholesky

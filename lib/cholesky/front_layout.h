@@ -3,7 +3,7 @@
 
 #include <cstddef>
 
-namespace gewebe {
+namespace gewebe::cholesky {
 
 /// Columns that are eliminated together, at most: a block of L.
 inline constexpr std::size_t front_block = 128;
@@ -22,4 +22,4 @@ inline double* front_column(double* l, std::size_t rows, std::size_t c) {
   return l + front_offset(rows, c) - c / front_block * front_block;
 }
 
-} // namespace gewebe
+} // namespace gewebe::cholesky

@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-namespace gewebe {
+namespace gewebe::cholesky {
 
 namespace {
 
@@ -86,4 +86,4 @@ void UpdateStacks::pop(std::uint8_t stack, std::size_t below) {
   size_.pop(stack, below);
 }
 
-} // namespace gewebe
+} // namespace gewebe::cholesky

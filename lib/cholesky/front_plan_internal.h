@@ -11,7 +11,7 @@
 #include <utility>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::cholesky {
 
 /// Floating-point operations of a front.
 double front_operations(const Front& front);
@@ -60,4 +60,4 @@ private:
   Size size_;
 };
 
-} // namespace gewebe
+} // namespace gewebe::cholesky

@@ -7,7 +7,7 @@
 // and Ashcraft & Grimes, The influence of relaxed supernode partitions on the multifrontal method,
 // 1989 (joining fronts).
 
-namespace gewebe {
+namespace gewebe::cholesky {
 
 namespace {
 
@@ -241,4 +241,4 @@ FrontTree front_tree(const BlockGraph& graph, std::span<const std::uint32_t> ord
   return tree;
 }
 
-} // namespace gewebe
+} // namespace gewebe::cholesky

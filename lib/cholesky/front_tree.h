@@ -11,7 +11,7 @@
 #include <span>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::cholesky {
 
 struct FrontTree {
   static constexpr std::uint32_t none = UINT32_MAX;
@@ -38,4 +38,4 @@ struct FrontTree {
 /// fronts are faster. \pre `order` holds the nodes with free axes, each once
 FrontTree front_tree(const BlockGraph& graph, std::span<const std::uint32_t> order);
 
-} // namespace gewebe
+} // namespace gewebe::cholesky

@@ -11,7 +11,7 @@
 // precision, 1971 (the exact product); Knuth, The Art of Computer Programming 2, 4.2.2 (the exact
 // sum).
 
-namespace gewebe {
+namespace gewebe::cholesky {
 namespace {
 
 using Pair = double __attribute__((vector_size(16)));
@@ -63,4 +63,4 @@ inline Pair lose_fused(Pair sum, Pair a, Pair b) {
 }
 
 } // namespace
-} // namespace gewebe
+} // namespace gewebe::cholesky

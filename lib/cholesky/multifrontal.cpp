@@ -14,7 +14,7 @@
 // Based on: Duff, Reid, The Multifrontal Solution of Indefinite Sparse Symmetric Linear Equations,
 // 1983; Liu, The multifrontal method for sparse matrix solution: theory and practice, 1992.
 
-namespace gewebe {
+namespace gewebe::cholesky {
 
 namespace {
 
@@ -280,18 +280,18 @@ FrontalWork factorise(const Multifrontal& task, std::span<const char> selected,
   const FrontPlan plan =
       front_plan(tree, under, work.operations, thread_count(context), task.keep_updates);
   // Computes the selected fronts of `some`, one after the other.
-  const auto run = [&](const auto& some, Team& team) {
-    UpdateStacks::Size size;
+  const auto run = [&](const auto& some, gewebe::Team& team) {
+    gewebe::cholesky::UpdateStacks::Size size;
     for (const std::size_t f : some)
       size.compute(plan, task.fronts, f);
-    Scratch scratch;
+    gewebe::cholesky::Scratch scratch;
     scratch.row.resize(task.axes.size());
     scratch.stacks.prepare(size);
     for (const std::size_t f : some)
       if (is_selected(f)) {
         if (context.cancelled && context.cancelled())
-          throw Cancelled();
-        compute(task, plan, f, scratch, context.cpu, team);
+          throw gewebe::Cancelled();
+        gewebe::cholesky::compute(task, plan, f, scratch, context.cpu, team);
       }
   };
   std::vector<std::optional<PivotTooSmall>> failed(plan.subtrees.size());
@@ -315,4 +315,4 @@ FrontalWork factorise(const Multifrontal& task, std::span<const char> selected,
   return work;
 }
 
-} // namespace gewebe
+} // namespace gewebe::cholesky

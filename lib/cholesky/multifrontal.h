@@ -16,7 +16,7 @@
 #include <span>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::cholesky {
 
 /// Memory for numbers of a front.
 class FrontMemory {
@@ -104,4 +104,4 @@ double update_bytes(const FrontTree& tree, std::span<const Front> fronts, bool k
 FrontalWork factorise(const Multifrontal& task, std::span<const char> selected,
                       const Context& context);
 
-} // namespace gewebe
+} // namespace gewebe::cholesky

@@ -12,7 +12,7 @@
 // Graphs, 1998 (METIS); Amestoy, Davis, Duff, An Approximate Minimum Degree Ordering Algorithm,
 // 1996 (AMD); Chen, Davis, Hager, Rajamanickam, Algorithm 887: CHOLMOD, 2008, which calls both.
 
-namespace gewebe {
+namespace gewebe::cholesky {
 
 static_assert(sizeof(SuiteSparse_long) == sizeof(std::int64_t));
 
@@ -99,4 +99,4 @@ std::vector<std::uint32_t> elimination_order(const BlockGraph& graph) {
   return order;
 }
 
-} // namespace gewebe
+} // namespace gewebe::cholesky

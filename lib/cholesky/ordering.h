@@ -6,7 +6,7 @@
 #include <cstdint>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::cholesky {
 
 /// Elimination order of the nodes of a graph, by CHOLMOD. Tries nested dissection (METIS) and
 /// minimum degree (AMD), and returns the order with less fill. The order depends on the graph
@@ -14,4 +14,4 @@ namespace gewebe {
 /// \throw Error if the graph is too large, std::bad_alloc
 std::vector<std::uint32_t> elimination_order(const BlockGraph& graph);
 
-} // namespace gewebe
+} // namespace gewebe::cholesky

@@ -322,7 +322,7 @@ std::vector<std::uint32_t> vertices_of(const Candidates& candidates) {
 template <std::size_t n>
 double collision_free_step(const CollisionSurface& surface,
                            const std::array<std::uint32_t, n>& vertices, std::size_t first,
-                           std::span<const Vec3> x0, std::span<const Vec3> x1,
+                           std::span<const gewebe::Vec3> x0, std::span<const gewebe::Vec3> x1,
                            const Separation& separation, double t_max) {
   Separation of_pair = separation;
   of_pair.d_min += radius_sum(surface, vertices.front(), vertices.back());

@@ -23,7 +23,7 @@ double largest_coordinate(std::span<const Vec3> x) {
   double largest = 0;
   for (const Vec3& p : x)
     for (int axis = 0; axis < 3; ++axis)
-      largest = larger(largest, std::abs(p[axis]));
+      largest = numeric::larger(largest, std::abs(p[axis]));
   return largest;
 }
 
@@ -34,7 +34,7 @@ public:
   Advancement(std::span<const Vec3, n> x0, std::span<const Vec3, n> x1, std::size_t first,
               double d_min)
       : first_(first), x0_(x0) {
-    const double size = larger(largest_coordinate(x0), largest_coordinate(x1));
+    const double size = numeric::larger(largest_coordinate(x0), largest_coordinate(x1));
     offset_ = d_min + rounding * size;
     finite_ = std::isfinite(offset_);
     for (std::size_t k = 0; k < n; ++k)
@@ -82,7 +82,7 @@ public:
     double lower = std::numeric_limits<double>::infinity();
     for (std::size_t i = 0; i < first_; ++i)
       for (std::size_t j = first_; j < n; ++j)
-        lower = smaller(lower, height_[i] - height_[j]);
+        lower = numeric::smaller(lower, height_[i] - height_[j]);
     return lower - offset_;
   }
 
@@ -92,7 +92,7 @@ public:
   /// nothing.
   double time_until(double kept, double longest) const {
     const double still = time_of_plane(kept);
-    return still >= longest ? still : larger(still, time_of_turning_plane(kept));
+    return still >= longest ? still : numeric::larger(still, time_of_turning_plane(kept));
   }
 
 private:
@@ -105,7 +105,7 @@ private:
         if (!(more >= 0))
           return 0;
         if (closing > 0)
-          time = smaller(time, more / closing);
+          time = numeric::smaller(time, more / closing);
       }
     return time;
   }
@@ -159,7 +159,7 @@ private:
         const double discriminant = opening * opening - 4 * bend * more;
         if ((bend >= 0 && opening >= 0) || (bend > 0 && discriminant < 0))
           continue;
-        time = smaller(time, 2 * more / (std::sqrt(discriminant) - opening));
+        time = numeric::smaller(time, 2 * more / (std::sqrt(discriminant) - opening));
       }
     return time;
   }
@@ -185,7 +185,7 @@ double step_of(std::span<const Vec3, n> x0, std::span<const Vec3, n> x1, std::si
   const double gap = pair.go_to(0, closest_feature);
   if (!(gap > 0))
     return 0;
-  const double kept = smaller(separation.share * gap, separation.most);
+  const double kept = numeric::smaller(separation.share * gap, separation.most);
   // Newton's method from below: each plane shows how long its gap lasts.
   double t = 0;
   for (int iteration = 1;; ++iteration) {
@@ -232,7 +232,7 @@ double motion_bound(std::span<const Vec3> x0, std::span<const Vec3> x1, std::siz
   for (std::size_t k = 0; k < x0.size(); ++k) {
     const double way = norm(x1[k] - x0[k] - mean);
     double& most = k < first ? of_first : of_second;
-    most = larger(most, way);
+    most = numeric::larger(most, way);
   }
   return of_first + of_second;
 }

@@ -11,7 +11,7 @@
 #include <string>
 #include <utility>
 
-namespace gewebe {
+namespace gewebe::columns {
 
 namespace {
 
@@ -179,13 +179,13 @@ double ColumnCache::entry(std::uint32_t node, int axis, std::size_t row) const {
                                  : columns.wide.get()[at];
 }
 
-double ColumnCache::add(std::span<const NodeVector> forces, double allowed, const Context& context,
-                        std::span<double> sum) const {
+double ColumnCache::add(std::span<const contact::NodeVector> forces, double allowed,
+                        const Context& context, std::span<double> sum) const {
   const std::size_t rows = bounded_ ? bounded_rows : rows_at_once;
   const std::size_t blocks = (axes_ + rows - 1) / rows;
   std::vector<Term> terms;
   terms.reserve(3 * forces.size());
-  for (const NodeVector& f : forces) {
+  for (const contact::NodeVector& f : forces) {
     const Columns& columns = *(*now_.columns)[f.node];
     for (int a = 0; a < 3; ++a) {
       if (f.value[a] == 0)
@@ -275,4 +275,4 @@ double ColumnCache::add(std::span<const NodeVector> forces, double allowed, cons
   return max;
 }
 
-} // namespace gewebe
+} // namespace gewebe::columns

@@ -15,7 +15,7 @@
 #include <span>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::columns {
 
 /// Computes the columns of one to eight nodes: 9 m numbers each, node by node.
 using ColumnSolve =
@@ -68,7 +68,7 @@ public:
   /// most `allowed` (mm).
   /// \return largest sum of bounds left out of a row
   /// \pre sum.size() == 3 m; allowed is 0 unless bounded
-  double add(std::span<const NodeVector> forces, double allowed, const Context& context,
+  double add(std::span<const contact::NodeVector> forces, double allowed, const Context& context,
              std::span<double> sum) const;
 
   /// Number of contributions of a node's column to a block of rows that sums took, or skipped, so
@@ -97,4 +97,4 @@ private:
   mutable std::uint64_t taken_ = 0, skipped_ = 0;
 };
 
-} // namespace gewebe
+} // namespace gewebe::columns

@@ -8,7 +8,7 @@
 #include <string>
 #include <utility>
 
-namespace gewebe {
+namespace gewebe::columns {
 
 namespace {
 
@@ -142,4 +142,4 @@ CompressedMade compress_columns(std::span<const Vec3> positions,
   return made;
 }
 
-} // namespace gewebe
+} // namespace gewebe::columns

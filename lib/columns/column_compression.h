@@ -13,7 +13,7 @@
 #include <span>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::columns {
 
 /// Result of a compression: the layout, and its chunks in order.
 struct CompressedMade {
@@ -47,4 +47,4 @@ inline constexpr double min_relative = 1e-7;
 /// Largest number of nodes of a cluster.
 inline constexpr std::size_t cluster_nodes = 96;
 
-} // namespace gewebe
+} // namespace gewebe::columns

@@ -9,7 +9,7 @@
 #include <cstddef>
 #include <cstdint>
 
-namespace gewebe {
+namespace gewebe::columns {
 
 /// sum[r] += Σ factor[k] column[k][r] for begin <= r < end.
 template <class Entry>
@@ -40,4 +40,4 @@ ColumnSum<Entry> column_sum(CpuLevel level) {
   return &column_sum_avx2;
 }
 
-} // namespace gewebe
+} // namespace gewebe::columns

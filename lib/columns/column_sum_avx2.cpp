@@ -1,6 +1,6 @@
 #include "columns/column_sum_body_internal.h"
 
-namespace gewebe {
+namespace gewebe::columns {
 
 void column_sum_avx2(const double* const* column, const double* factor, std::size_t count,
                      double* sum, std::size_t begin, std::size_t end) {
@@ -22,4 +22,4 @@ void column_sum_avx2(const std::int8_t* const* column, const double* factor, std
   add_all(column, factor, count, sum, begin, end);
 }
 
-} // namespace gewebe
+} // namespace gewebe::columns

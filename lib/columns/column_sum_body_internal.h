@@ -7,20 +7,22 @@
 #include <cstring>
 #include <immintrin.h>
 
-namespace gewebe {
+namespace gewebe::columns {
 namespace {
 
 // Small integers need intrinsics, because compilers widen them one by one.
-inline void widen(__m128i whole, Four& to) { // four of 32 bits
+inline void widen(__m128i whole, numeric::Four& to) { // four of 32 bits
 #ifdef __AVX2__
-  to = reinterpret_cast<Four>(_mm256_cvtepi32_pd(whole));
+  to = reinterpret_cast<numeric::Four>(_mm256_cvtepi32_pd(whole));
 #else
   const __m128d low = _mm_cvtepi32_pd(whole), high = _mm_cvtepi32_pd(_mm_srli_si128(whole, 8));
   std::memcpy(&to, &low, sizeof low);
   std::memcpy(reinterpret_cast<char*>(&to) + sizeof low, &high, sizeof high);
 #endif
 }
-inline void load(const std::int16_t* at, Four& to) {
+using numeric::load; // of double and float
+
+inline void load(const std::int16_t* at, numeric::Four& to) {
   std::int64_t four = 0;
   std::memcpy(&four, at, sizeof four);
   const __m128i packed = _mm_cvtsi64_si128(four);
@@ -30,7 +32,7 @@ inline void load(const std::int16_t* at, Four& to) {
   widen(_mm_srai_epi32(_mm_unpacklo_epi16(packed, packed), 16), to);
 #endif
 }
-inline void load(const std::int8_t* at, Four& to) {
+inline void load(const std::int8_t* at, numeric::Four& to) {
   std::int32_t four = 0;
   std::memcpy(&four, at, sizeof four);
   const __m128i packed = _mm_cvtsi32_si128(four);
@@ -53,15 +55,15 @@ void add(const Entry* const* column, const double* factor, double* sum, std::siz
   }
   std::size_t r = begin;
   for (; r + 8 <= end; r += 8) {
-    Four low = four(sum + r), high = four(sum + r + 4), a, b;
+    numeric::Four low = numeric::four(sum + r), high = numeric::four(sum + r + 4), a, b;
     for (int k = 0; k < Width; ++k) {
       load(from[k] + r, a);
       load(from[k] + r + 4, b);
       low += a * by[k];
       high += b * by[k];
     }
-    four(sum + r) = low;
-    four(sum + r + 4) = high;
+    numeric::four(sum + r) = low;
+    numeric::four(sum + r + 4) = high;
   }
   for (; r < end; ++r)
     for (int k = 0; k < Width; ++k)
@@ -83,4 +85,4 @@ void add_all(const Entry* const* column, const double* factor, std::size_t count
 }
 
 } // namespace
-} // namespace gewebe
+} // namespace gewebe::columns

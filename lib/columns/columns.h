@@ -14,7 +14,7 @@
 #include <span>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::columns {
 
 class CompressedColumns;
 
@@ -73,4 +73,4 @@ public:
   virtual void write(std::size_t k, std::span<const double> columns, double residual) = 0;
 };
 
-} // namespace gewebe
+} // namespace gewebe::columns

@@ -10,7 +10,7 @@
 #include <cmath>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::columns {
 
 namespace {
 
@@ -23,7 +23,7 @@ std::size_t wave_blocks(std::size_t nodes, const Context& context) {
 }
 
 /// 3 m for the first `row_nodes` nodes.
-std::size_t rows_of(const StiffnessMatrix& matrix, std::size_t row_nodes) {
+std::size_t rows_of(const linalg::StiffnessMatrix& matrix, std::size_t row_nodes) {
   return 3 * std::min(row_nodes, matrix.row_of_axis.size() / 3);
 }
 
@@ -41,7 +41,7 @@ double weight(std::size_t c) {
 
 class Columns {
 public:
-  Columns(const StiffnessMatrix& matrix, const Factor& factor, double norm,
+  Columns(const linalg::StiffnessMatrix& matrix, const linalg::Factor& factor, double norm,
           std::span<const std::uint32_t> nodes, CpuLevel cpu, std::size_t row_nodes)
       : matrix_(matrix), factor_(factor), norm_(norm), nodes_(nodes), cpu_(cpu),
         rows_(rows_of(matrix, row_nodes)), place_(matrix.order()) {
@@ -84,7 +84,7 @@ public:
                       .at = matrix_.axis_of_row,
                       .end = static_cast<std::int64_t>(axes)},
                      to, weights.data(), out.sum.data());
-    out.residual = backward_error(matrix_, norm_, out.sum, out.load);
+    out.residual = linalg::backward_error(matrix_, norm_, out.sum, out.load);
   }
 
   void hand_over(std::size_t block, const Block& from, ColumnSink& sink, double& residual) const {
@@ -103,13 +103,13 @@ private:
     return matrix_.row_of_axis[3 * std::size_t{node} + axis];
   }
   static void keep_worst(double& worst, double error) {
-    if (!(error <= max_backward_error))
+    if (!(error <= linalg::max_backward_error))
       throw Error("a column has a backward error beyond 1e-14");
     worst = std::max(worst, error);
   }
 
-  const StiffnessMatrix& matrix_;
-  const Factor& factor_;
+  const linalg::StiffnessMatrix& matrix_;
+  const linalg::Factor& factor_;
   double norm_;
   std::span<const std::uint32_t> nodes_;
   CpuLevel cpu_;
@@ -119,7 +119,7 @@ private:
 
 } // namespace
 
-double compliance_columns_bytes(const StiffnessMatrix& matrix, std::size_t nodes,
+double compliance_columns_bytes(const linalg::StiffnessMatrix& matrix, std::size_t nodes,
                                 const Context& context, std::size_t row_nodes) {
   // A block has a panel and the columns; those of the wave before wait to be handed over.
   const double block =
@@ -128,8 +128,8 @@ double compliance_columns_bytes(const StiffnessMatrix& matrix, std::size_t nodes
   return block * static_cast<double>(wave_blocks(nodes, context));
 }
 
-double compliance_columns(const StiffnessMatrix& matrix, const Factor& factor, double norm,
-                          std::span<const std::uint32_t> nodes, const Context& context,
+double compliance_columns(const linalg::StiffnessMatrix& matrix, const linalg::Factor& factor,
+                          double norm, std::span<const std::uint32_t> nodes, const Context& context,
                           ColumnSink& sink, std::size_t row_nodes) {
   require_memory(context,
                  compliance_columns_bytes(matrix, nodes.size(), context, row_nodes) +
@@ -161,4 +161,4 @@ double compliance_columns(const StiffnessMatrix& matrix, const Factor& factor, d
   return residual;
 }
 
-} // namespace gewebe
+} // namespace gewebe::columns

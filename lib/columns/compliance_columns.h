@@ -11,10 +11,10 @@
 #include <cstdint>
 #include <span>
 
-namespace gewebe {
+namespace gewebe::columns {
 
 /// Number of consecutive nodes that are solved for and checked together.
-inline constexpr std::size_t compliance_block = Factor::max_units / 3;
+inline constexpr std::size_t compliance_block = linalg::Factor::max_units / 3;
 
 /// Solves for the columns of `nodes` in blocks, in parallel, and hands them to `sink` in the order
 /// of `nodes` while later ones are being computed. Results are the same bytes for any number of
@@ -28,12 +28,12 @@ inline constexpr std::size_t compliance_block = Factor::max_units / 3;
 /// \pre nodes < n, ascending; the factor is of this matrix
 /// \throw Error if that error exceeds max_backward_error, or if memory exceeds the context's; the
 /// exceptions of the sink; Cancelled
-double compliance_columns(const StiffnessMatrix& matrix, const Factor& factor, double norm,
-                          std::span<const std::uint32_t> nodes, const Context& context,
+double compliance_columns(const linalg::StiffnessMatrix& matrix, const linalg::Factor& factor,
+                          double norm, std::span<const std::uint32_t> nodes, const Context& context,
                           ColumnSink& sink, std::size_t row_nodes = SIZE_MAX);
 
 /// Memory of compliance_columns beside matrix and factor, bytes.
-double compliance_columns_bytes(const StiffnessMatrix& matrix, std::size_t nodes,
+double compliance_columns_bytes(const linalg::StiffnessMatrix& matrix, std::size_t nodes,
                                 const Context& context, std::size_t row_nodes = SIZE_MAX);
 
-} // namespace gewebe
+} // namespace gewebe::columns

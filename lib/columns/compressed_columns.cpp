@@ -10,7 +10,7 @@
 #include <map>
 #include <utility>
 
-namespace gewebe {
+namespace gewebe::columns {
 
 namespace {
 
@@ -203,7 +203,7 @@ double CompressedColumns::entry(std::uint32_t node, int axis, std::size_t row) c
   return sum;
 }
 
-void CompressedColumns::add(std::span<const NodeVector> forces, const Context& context,
+void CompressedColumns::add(std::span<const contact::NodeVector> forces, const Context& context,
                             std::span<double> u) const {
   const std::vector<ClusterLoad> loads = loads_of(forces);
   double work = 0;
@@ -226,9 +226,10 @@ void CompressedColumns::add(std::span<const NodeVector> forces, const Context& c
   });
 }
 
-std::vector<ClusterLoad> CompressedColumns::loads_of(std::span<const NodeVector> forces) const {
+std::vector<ClusterLoad>
+CompressedColumns::loads_of(std::span<const contact::NodeVector> forces) const {
   std::map<std::size_t, std::vector<CrossLoad>> loads; // by cluster
-  for (const NodeVector& f : forces)
+  for (const contact::NodeVector& f : forces)
     for (int a = 0; a < 3; ++a)
       if (f.value[a] != 0)
         loads[of(f.node)].push_back(
@@ -252,7 +253,7 @@ std::vector<double> CompressedColumns::sum_at(std::size_t cluster,
 }
 
 std::vector<double> CompressedColumns::sum_at(std::span<const std::uint32_t> clusters,
-                                              std::span<const NodeVector> forces,
+                                              std::span<const contact::NodeVector> forces,
                                               const Context& context) const {
   const std::vector<ClusterLoad> loads = loads_of(forces);
   std::vector<double> all;
@@ -272,7 +273,7 @@ std::span<const std::array<double, 2>> CompressedColumns::largest(std::size_t ch
   return kept;
 }
 
-std::vector<double> CompressedColumns::bounds(std::span<const NodeVector> forces,
+std::vector<double> CompressedColumns::bounds(std::span<const contact::NodeVector> forces,
                                               const Context& context) const {
   const std::vector<ClusterLoad> loads = loads_of(forces);
   std::vector<double> bound(layout_.clusters.size());
@@ -299,7 +300,7 @@ void CompressedColumns::read(std::size_t k, std::span<double> out) const {
   alone.threads = 1;
   const std::size_t axes = out.size() / 3;
   for (int a = 0; a < 3; ++a) {
-    NodeVector unit{nodes_[k], {}};
+    contact::NodeVector unit{nodes_[k], {}};
     unit.value[a] = 1;
     add({&unit, 1}, alone, out.subspan(static_cast<std::size_t>(a) * axes, axes));
   }
@@ -317,4 +318,4 @@ double CompressedColumns::numbers(std::span<const std::uint32_t> nodes) const {
   return sum;
 }
 
-} // namespace gewebe
+} // namespace gewebe::columns

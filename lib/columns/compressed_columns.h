@@ -23,7 +23,7 @@
 #include <span>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::columns {
 
 /// Structure of compressed columns, without their entries.
 struct CompressedLayout {
@@ -77,15 +77,18 @@ public:
   double entry(std::uint32_t node, int axis, std::size_t row) const;
   /// u += C f over the first 3 m axes, for forces at nodes that have columns. The result is the
   /// same bytes for any number of threads.
-  void add(std::span<const NodeVector> forces, const Context& context, std::span<double> u) const;
+  void add(std::span<const contact::NodeVector> forces, const Context& context,
+           std::span<double> u) const;
 
   /// C f at the nodes of some clusters of layout(): 3 numbers for each node, cluster by cluster,
   /// with the bits of add() to zeros. \pre as add
   std::vector<double> sum_at(std::span<const std::uint32_t> clusters,
-                             std::span<const NodeVector> forces, const Context& context) const;
+                             std::span<const contact::NodeVector> forces,
+                             const Context& context) const;
   /// Bound of the size of C f along an axis, by cluster. It costs much less than the sum. \pre as
   /// add
-  std::vector<double> bounds(std::span<const NodeVector> forces, const Context& context) const;
+  std::vector<double> bounds(std::span<const contact::NodeVector> forces,
+                             const Context& context) const;
 
   /// Number of values that a sum with forces at these nodes reads from memory.
   double numbers(std::span<const std::uint32_t> nodes) const;
@@ -101,7 +104,7 @@ public:
 private:
   std::uint32_t of(std::uint32_t node) const { return cluster_[node]; }
   /// The forces of a sum, by ascending clusters; reads what the sum needs.
-  std::vector<ClusterLoad> loads_of(std::span<const NodeVector> forces) const;
+  std::vector<ClusterLoad> loads_of(std::span<const contact::NodeVector> forces) const;
   /// C f at a cluster's nodes in their order.
   std::vector<double> sum_at(std::size_t cluster, std::span<const ClusterLoad> loads,
                              CpuLevel cpu) const;
@@ -130,4 +133,4 @@ private:
   mutable std::uint64_t chunks_read_ = 0;
 };
 
-} // namespace gewebe
+} // namespace gewebe::columns

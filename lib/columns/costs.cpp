@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-namespace gewebe::costs {
+namespace gewebe::columns::costs {
 
 std::size_t usual_entries(std::size_t axes) {
   return 70 * axes;
@@ -66,4 +66,4 @@ bool correcting_columns_pays(std::size_t columns, std::size_t axes, std::size_t 
   return respond + correct <= count * solve;
 }
 
-} // namespace gewebe::costs
+} // namespace gewebe::columns::costs

@@ -6,7 +6,7 @@
 
 #include <cstddef>
 
-namespace gewebe::costs {
+namespace gewebe::columns::costs {
 
 /// Estimated number of doubles of L, for a factor that is not loaded yet.
 std::size_t usual_entries(std::size_t axes);
@@ -69,4 +69,4 @@ bool order_is_worn_out(double all_operations, double fresh_operations);
 bool correcting_columns_pays(std::size_t columns, std::size_t axes, std::size_t entries,
                              std::size_t rank, int responses);
 
-} // namespace gewebe::costs
+} // namespace gewebe::columns::costs

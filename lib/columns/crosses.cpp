@@ -8,7 +8,7 @@
 #include <cmath>
 #include <type_traits>
 
-namespace gewebe {
+namespace gewebe::columns {
 
 namespace {
 
@@ -337,4 +337,4 @@ void add_product(const CrossView& block, bool transposed, std::span<const CrossL
                  transposed, x, cpu, y);
 }
 
-} // namespace gewebe
+} // namespace gewebe::columns

@@ -19,7 +19,7 @@
 #include <span>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::columns {
 
 /// Terms of several blocks, block by block; within a block those of int16 first.
 struct Crosses {
@@ -80,4 +80,4 @@ double product_bound(const CrossView& block, bool transposed, std::span<const Cr
 void add_product(const CrossView& block, bool transposed, std::span<const CrossLoad> x,
                  CpuLevel cpu, std::span<double> y);
 
-} // namespace gewebe
+} // namespace gewebe::columns

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <tuple>
 
-namespace gewebe {
+namespace gewebe::columns {
 
 namespace {
 
@@ -38,4 +38,4 @@ void append_clusters(std::span<const Vec3> positions, std::span<const std::uint3
   halve(positions, all, most, to);
 }
 
-} // namespace gewebe
+} // namespace gewebe::columns

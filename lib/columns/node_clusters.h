@@ -8,7 +8,7 @@
 #include <span>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::columns {
 
 /// Nodes by cluster, ascending in each.
 struct NodeClusters {
@@ -27,4 +27,4 @@ struct NodeClusters {
 void append_clusters(std::span<const Vec3> positions, std::span<const std::uint32_t> nodes,
                      std::size_t most, NodeClusters& to);
 
-} // namespace gewebe
+} // namespace gewebe::columns

@@ -9,7 +9,7 @@
 #include <cstdint>
 #include <span>
 
-namespace gewebe {
+namespace gewebe::columns {
 
 struct PanelRows {
   const double* x = nullptr;           ///< x[place][column]
@@ -34,4 +34,4 @@ inline TakePanel take_panel(CpuLevel level) {
   return level == CpuLevel::baseline ? &take_panel_baseline : &take_panel_avx2;
 }
 
-} // namespace gewebe
+} // namespace gewebe::columns

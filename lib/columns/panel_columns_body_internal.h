@@ -8,17 +8,17 @@
 #include <cstddef>
 #include <span>
 
-namespace gewebe {
+namespace gewebe::columns {
 namespace {
 
 inline constexpr std::size_t rows_at_once = 8; ///< two blocks, whose sums don't wait for each other
 
 /// Transposes a block of four rows.
-inline void transpose(Four& a, Four& b, Four& c, Four& d) {
-  const Four low = __builtin_shufflevector(a, b, 0, 4, 2, 6);
-  const Four high = __builtin_shufflevector(a, b, 1, 5, 3, 7);
-  const Four lower = __builtin_shufflevector(c, d, 0, 4, 2, 6);
-  const Four higher = __builtin_shufflevector(c, d, 1, 5, 3, 7);
+inline void transpose(numeric::Four& a, numeric::Four& b, numeric::Four& c, numeric::Four& d) {
+  const numeric::Four low = __builtin_shufflevector(a, b, 0, 4, 2, 6);
+  const numeric::Four high = __builtin_shufflevector(a, b, 1, 5, 3, 7);
+  const numeric::Four lower = __builtin_shufflevector(c, d, 0, 4, 2, 6);
+  const numeric::Four higher = __builtin_shufflevector(c, d, 1, 5, 3, 7);
   a = __builtin_shufflevector(low, lower, 0, 1, 4, 5);
   b = __builtin_shufflevector(high, higher, 0, 1, 4, 5);
   c = __builtin_shufflevector(low, lower, 2, 3, 6, 7);
@@ -36,21 +36,21 @@ inline void take_together(const PanelRows& rows, std::size_t first, std::span<do
   for (std::size_t i = 0; i < rows_at_once; ++i)
     x[i] = panel_row(rows, first + i);
   const auto at = static_cast<std::size_t>(rows.at[first]);
-  Four low{}, high{};
+  numeric::Four low{}, high{};
   std::size_t c = 0;
   for (; c + 4 <= column.size(); c += 4) {
-    Four a[4], b[4];
+    numeric::Four a[4], b[4];
     for (std::size_t i = 0; i < 4; ++i) {
-      load(x[i] + c, a[i]);
-      load(x[i + 4] + c, b[i]);
+      numeric::load(x[i] + c, a[i]);
+      numeric::load(x[i + 4] + c, b[i]);
     }
     transpose(a[0], a[1], a[2], a[3]);
     transpose(b[0], b[1], b[2], b[3]);
     for (std::size_t j = 0; j < 4; ++j) {
       low += weight[c + j] * a[j];
       high += weight[c + j] * b[j];
-      four(column[c + j] + at) = a[j];
-      four(column[c + j] + at + 4) = b[j];
+      numeric::four(column[c + j] + at) = a[j];
+      numeric::four(column[c + j] + at + 4) = b[j];
     }
   }
   for (; c < column.size(); ++c)
@@ -60,8 +60,8 @@ inline void take_together(const PanelRows& rows, std::size_t first, std::span<do
       column[c][at + i] = x[i][c];
       column[c][at + i + 4] = x[i + 4][c];
     }
-  four(sum + first) = low;
-  four(sum + first + 4) = high;
+  numeric::four(sum + first) = low;
+  numeric::four(sum + first + 4) = high;
 }
 
 inline void take_one(const PanelRows& rows, std::size_t r, std::span<double* const> column,
@@ -97,4 +97,4 @@ inline void take(const PanelRows& rows, std::span<double* const> column, const d
 }
 
 } // namespace
-} // namespace gewebe
+} // namespace gewebe::columns

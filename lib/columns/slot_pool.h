@@ -9,7 +9,7 @@
 #include <memory>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::columns {
 
 /// Slots return to the pool when their last owner goes, and keep the pool alive.
 template <class T>
@@ -40,4 +40,4 @@ private:
   std::vector<T*> free_;
 };
 
-} // namespace gewebe
+} // namespace gewebe::columns

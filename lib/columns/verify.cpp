@@ -12,7 +12,7 @@
 #include <utility>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::columns {
 
 namespace {
 
@@ -23,7 +23,7 @@ double product(std::span<const double> a, std::span<const double> b) {
 double largest(std::span<const double> values) {
   double max = 0;
   for (const double value : values)
-    max = larger(max, std::fabs(value));
+    max = numeric::larger(max, std::fabs(value));
   return max;
 }
 
@@ -36,7 +36,8 @@ std::string number(double value) {
 /// Compares the columns of one node with those that conjugate gradients find.
 class Recomputed {
 public:
-  Recomputed(const StiffnessMatrix& matrix, double tolerance, double bound, const Context& context)
+  Recomputed(const linalg::StiffnessMatrix& matrix, double tolerance, double bound,
+             const Context& context)
       : matrix_(matrix), tolerance_(tolerance), bound_(bound), context_(context),
         load_(matrix.order()), x_(matrix.order()) {}
 
@@ -63,7 +64,7 @@ public:
       double difference = 0;
       for (std::size_t r = 0; r < x_.size(); ++r)
         if (const auto axis = static_cast<std::size_t>(matrix_.axis_of_row[r]); axis < axes)
-          difference = larger(difference, std::fabs(column[axis] - x_[r]));
+          difference = numeric::larger(difference, std::fabs(column[axis] - x_[r]));
       const double tolerance = tolerance_ + bound_ / largest(x_);
       difference /= largest(x_);
       ++result.recomputed;
@@ -77,7 +78,7 @@ public:
   }
 
 private:
-  const StiffnessMatrix& matrix_;
+  const linalg::StiffnessMatrix& matrix_;
   double tolerance_, bound_; ///< of what is compared, and of each entry
   const Context& context_;
   std::vector<double> load_, x_;
@@ -132,7 +133,7 @@ void verify_stored(const ColumnSource& columns, std::span<const std::size_t> cho
 
 } // namespace
 
-std::size_t conjugate_gradients(const StiffnessMatrix& matrix, std::span<const double> f,
+std::size_t conjugate_gradients(const linalg::StiffnessMatrix& matrix, std::span<const double> f,
                                 std::span<double> x, const Context& context) {
   const std::size_t n = matrix.order();
   std::vector<double> inverse(n), r(f.begin(), f.end()), z(n), p(n), q(n);
@@ -153,7 +154,7 @@ std::size_t conjugate_gradients(const StiffnessMatrix& matrix, std::span<const d
       throw Error("conjugate gradients found no solution in " + std::to_string(step) + " steps");
     if (step % 64 == 0 && context.cancelled && context.cancelled())
       throw Cancelled();
-    multiply(matrix, p, q);
+    linalg::multiply(matrix, p, q);
     const double curvature = product(p, q);
     if (!(curvature > 0))
       throw Error("the stiffness matrix is not positive definite along a direction of conjugate "
@@ -170,7 +171,7 @@ std::size_t conjugate_gradients(const StiffnessMatrix& matrix, std::span<const d
   }
 }
 
-Verification verify_compliance(const StiffnessMatrix& matrix, const Factor& factor,
+Verification verify_compliance(const linalg::StiffnessMatrix& matrix, const linalg::Factor& factor,
                                const ColumnSource* columns, const VerifyOptions& options,
                                const Context& context) {
   Verification result;
@@ -190,11 +191,11 @@ Verification verify_compliance(const StiffnessMatrix& matrix, const Factor& fact
     for (std::size_t a = 0; a < 3; ++a) {
       std::ranges::fill(f, 0.0);
       f[3 * node + a] = 1;
-      solve_axes(matrix, factor, f, std::span(made).subspan(a * axes, axes));
+      linalg::solve_axes(matrix, factor, f, std::span(made).subspan(a * axes, axes));
     }
     again.compare(static_cast<std::uint32_t>(node), node % 3, made, result);
   }
   return result;
 }
 
-} // namespace gewebe
+} // namespace gewebe::columns

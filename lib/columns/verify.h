@@ -10,13 +10,13 @@
 #include <cstdint>
 #include <span>
 
-namespace gewebe {
+namespace gewebe::columns {
 
 /// Solves K x = f by conjugate gradients with K's diagonal as preconditioner (Hestenes and Stiefel
 /// 1952), until their recursive residual is below 1e-15 ‖f‖. Returns the number of steps.
 /// \pre x.size() == f.size() == matrix.order()
 /// \throw Error if 100 order() + 1000 steps don't suffice, or K proves to be indefinite; Cancelled
-std::size_t conjugate_gradients(const StiffnessMatrix& matrix, std::span<const double> f,
+std::size_t conjugate_gradients(const linalg::StiffnessMatrix& matrix, std::span<const double> f,
                                 std::span<double> x, const Context& context);
 
 struct Verification {
@@ -41,8 +41,8 @@ struct VerifyOptions {
 /// error of the method and the bound.
 /// \throw Error with the node whose columns differ by more, aren't symmetric, or aren't finite; as
 /// the source and conjugate_gradients
-Verification verify_compliance(const StiffnessMatrix& matrix, const Factor& factor,
+Verification verify_compliance(const linalg::StiffnessMatrix& matrix, const linalg::Factor& factor,
                                const ColumnSource* columns, const VerifyOptions& options,
                                const Context& context);
 
-} // namespace gewebe
+} // namespace gewebe::columns

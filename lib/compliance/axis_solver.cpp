@@ -9,7 +9,7 @@
 #include <string>
 #include <utility>
 
-namespace gewebe {
+namespace gewebe::compliance {
 
 void AxisSolver::solve(std::span<double> over_axes, std::size_t columns) const {
   const std::size_t axes = row_of_axis.size(), order = factor.order();
@@ -25,25 +25,25 @@ void AxisSolver::solve(std::span<double> over_axes, std::size_t columns) const {
           row_of_axis[a] < 0 ? 0 : u[c * order + static_cast<std::size_t>(row_of_axis[a])];
 }
 
-AxisSolver factorise_axes(const Model& model, const Context& context) {
-  StiffnessMatrix matrix = stiffness_matrix(model, {}, context);
-  StiffnessCheck check;
-  Factor factor = checked_factor(model, matrix, context, check);
+AxisSolver factorise_axes(const model::Model& model, const Context& context) {
+  linalg::StiffnessMatrix matrix = fem::stiffness_matrix(model, {}, context);
+  linalg::StiffnessCheck check;
+  linalg::Factor factor = linalg::checked_factor(model, matrix, context, check);
   return {std::move(factor), std::move(matrix.row_of_axis)};
 }
 
-AxisSolver factorise_axes(const Model& model, std::span<const std::uint8_t> held,
+AxisSolver factorise_axes(const model::Model& model, std::span<const std::uint8_t> held,
                           const Context& context) {
-  StiffnessMatrix matrix = stiffness_matrix(model, held, context);
-  return {Factor(matrix, context), std::move(matrix.row_of_axis)};
+  linalg::StiffnessMatrix matrix = fem::stiffness_matrix(model, held, context);
+  return {linalg::Factor(matrix, context), std::move(matrix.row_of_axis)};
 }
 
-AxisSolver stored_axes(const Model& model, Factor factor) {
+AxisSolver stored_axes(const model::Model& model, linalg::Factor factor) {
   std::vector<std::int64_t> rows(3 * model.nodes.size(), -1);
   std::int64_t next = 0;
   for (std::size_t i = 0; i < model.nodes.size(); ++i)
     for (int a = 0; a < 3; ++a)
-      if (!is_fixed(model, i, a))
+      if (!contact::is_fixed(model, i, a))
         rows[3 * i + static_cast<std::size_t>(a)] = next++;
   if (factor.order() != static_cast<std::size_t>(next))
     throw Error("the factor has " + std::to_string(factor.order()) + " rows, expected " +
@@ -51,4 +51,4 @@ AxisSolver stored_axes(const Model& model, Factor factor) {
   return {std::move(factor), std::move(rows)};
 }
 
-} // namespace gewebe
+} // namespace gewebe::compliance

@@ -12,7 +12,7 @@
 #include <string>
 #include <utility>
 
-namespace gewebe {
+namespace gewebe::compliance {
 
 namespace {
 
@@ -22,21 +22,21 @@ double column_bytes(const Context& context) {
   return std::min(static_cast<double>(context.max_memory) / 4, max_column_bytes);
 }
 
-std::vector<std::uint32_t> nodes_of(std::span<const NodeVector> forces) {
+std::vector<std::uint32_t> nodes_of(std::span<const contact::NodeVector> forces) {
   std::vector<std::uint32_t> nodes;
   nodes.reserve(forces.size());
-  for (const NodeVector& f : forces)
+  for (const contact::NodeVector& f : forces)
     nodes.push_back(f.node);
   return nodes;
 }
 
 /// m, of the source's columns.
-std::size_t row_nodes_of(const Model& model, const ComplianceSource& source) {
-  const ColumnSource* const columns = source.columns();
+std::size_t row_nodes_of(const model::Model& model, const ComplianceSource& source) {
+  const columns::ColumnSource* const columns = source.columns();
   const std::size_t all = model.nodes.size();
   if (columns == nullptr || columns->row_nodes() == all)
     return all;
-  if (const std::size_t surface = surface_count(model); columns->row_nodes() != surface)
+  if (const std::size_t surface = model::surface_count(model); columns->row_nodes() != surface)
     throw Error("the columns have rows for " + std::to_string(columns->row_nodes()) +
                 " nodes, expected the " + std::to_string(surface) + " of the surface or all " +
                 std::to_string(all));
@@ -44,16 +44,16 @@ std::size_t row_nodes_of(const Model& model, const ComplianceSource& source) {
 }
 
 /// Whether all nodes that can move and have rows have columns.
-bool have_all_columns(const Model& model, const CompressedColumns& columns) {
+bool have_all_columns(const model::Model& model, const columns::CompressedColumns& columns) {
   for (std::uint32_t node = 0; node < columns.row_nodes(); ++node)
-    if (model.nodes[node].fixed != fixed_all && !columns.has(node))
+    if (model.nodes[node].fixed != model::fixed_all && !columns.has(node))
       return false;
   return true;
 }
 
 } // namespace
 
-Compliance::Compliance(const Model& model, std::shared_ptr<ComplianceSource> source,
+Compliance::Compliance(const model::Model& model, std::shared_ptr<ComplianceSource> source,
                        const Context& context, bool bounded, bool may_be_free)
     : axes_(3 * model.nodes.size()), source_(source ? std::move(source) : compliance_of_model()),
       compressed_(source_->columns() != nullptr ? source_->columns()->compressed() : nullptr),
@@ -67,7 +67,7 @@ Compliance::Compliance(const Model& model, std::shared_ptr<ComplianceSource> sou
   source_->set_warm(false); // nothing is done for this one yet
   try {
     source_->open(model, context_);
-  } catch (const SingularStiffness& error) {
+  } catch (const linalg::SingularStiffness& error) {
     if (!may_be_free)
       throw;
     free_ = error;
@@ -89,11 +89,11 @@ void Compliance::restore(const Past& past) {
 
 void Compliance::require_held() const {
   if (free_)
-    throw SingularStiffness(*free_);
+    throw linalg::SingularStiffness(*free_);
 }
 
 /// Solves for columns, and keeps so many rows of them.
-ColumnSolve Compliance::columns_of(std::size_t rows) {
+columns::ColumnSolve Compliance::columns_of(std::size_t rows) {
   return [this, rows](std::span<const std::uint32_t> nodes, std::span<double> columns) {
     std::vector<double> whole;
     if (rows < axes_)
@@ -192,24 +192,24 @@ std::size_t Compliance::capacity() const noexcept {
                                 : std::max(cache_.capacity(), compressed_->nodes().size());
 }
 
-void Compliance::add_rows(std::span<const NodeVector> forces, std::span<const std::size_t> rows,
-                          std::span<double> values) {
+void Compliance::add_rows(std::span<const contact::NodeVector> forces,
+                          std::span<const std::size_t> rows, std::span<double> values) {
   need(nodes_of(forces));
   for (std::size_t k = 0; k < rows.size(); ++k)
-    for (const NodeVector& f : forces)
+    for (const contact::NodeVector& f : forces)
       for (int a = 0; a < 3; ++a)
         values[k] += entry(f.node, a, rows[k]) * f.value[a];
 }
 
-EntryBound Compliance::bound(std::span<const NodeVector> forces) const {
-  const ColumnSource* const columns = source_->columns();
+columns::EntryBound Compliance::bound(std::span<const contact::NodeVector> forces) const {
+  const columns::ColumnSource* const columns = source_->columns();
   if (columns == nullptr)
     return {};
-  EntryBound bound = columns->bound();
+  columns::EntryBound bound = columns->bound();
   if (bound.entry == 0)
     return {};
   double size = 0; // of forces that take part in a sum of stored columns
-  for (const NodeVector& f : forces)
+  for (const contact::NodeVector& f : forces)
     if (std::ranges::binary_search(columns->nodes(), f.node))
       for (int a = 0; a < 3; ++a)
         size += std::abs(f.value[a]);
@@ -228,10 +228,10 @@ bool Compliance::columns_pay(std::span<const std::uint32_t> nodes) const {
       std::count_if(nodes.begin(), nodes.end(), [&](std::uint32_t i) { return compressed(i); });
   if (count > 0) // a sum is of one kind
     return count == std::ssize(nodes) &&
-           costs::compressed_pay(compressed_->numbers(nodes), source_->entries());
-  const ColumnSource* const columns = source_->columns();
+           columns::costs::compressed_pay(compressed_->numbers(nodes), source_->entries());
+  const columns::ColumnSource* const columns = source_->columns();
   const bool single = columns != nullptr && columns->single();
-  const std::size_t max = costs::nodes_worth_a_solve(source_->entries(), rows_, single);
+  const std::size_t max = columns::costs::nodes_worth_a_solve(source_->entries(), rows_, single);
   return nodes.size() <= std::min(max, capacity()) &&
          std::all_of(nodes.begin(), nodes.end(), [&](std::uint32_t node) { return outer(node); }) &&
          stored(nodes);
@@ -246,22 +246,24 @@ bool Compliance::at_hand(std::span<const std::uint32_t> nodes) const {
 bool Compliance::columns_for_shape(std::span<const std::uint32_t> nodes, int shapes) {
   if (source_->blocks() == nullptr)
     return true; // that is where blocks came from
-  if (costs::columns_pay_for_shapes(nodes.size(), stored(nodes), shapes))
+  if (columns::costs::columns_pay_for_shapes(nodes.size(), stored(nodes), shapes))
     need(nodes);
   // Until then their stored columns, which would have to be corrected first, stay where they are.
   return std::all_of(nodes.begin(), nodes.end(),
                      [&](std::uint32_t node) { return cache_.resident(node); });
 }
 
-const CompressedColumns* Compliance::compressed_for(std::span<const std::uint32_t> nodes) const {
+const columns::CompressedColumns*
+Compliance::compressed_for(std::span<const std::uint32_t> nodes) const {
   return !nodes.empty() && compressed(nodes.front()) && columns_pay(nodes) ? compressed_ : nullptr;
 }
 
-void Compliance::add(std::span<const NodeVector> forces, double allowed, std::span<double> u) {
+void Compliance::add(std::span<const contact::NodeVector> forces, double allowed,
+                     std::span<double> u) {
   if (forces.empty())
     return;
   const std::vector<std::uint32_t> nodes = nodes_of(forces);
-  if (const CompressedColumns* const columns = compressed_for(nodes); columns != nullptr) {
+  if (const columns::CompressedColumns* const columns = compressed_for(nodes); columns != nullptr) {
     columns->add(forces, context_, u);
     return;
   }
@@ -271,7 +273,7 @@ void Compliance::add(std::span<const NodeVector> forces, double allowed, std::sp
     return;
   }
   std::vector<double> f(axes_, 0);
-  for (const NodeVector& force : forces)
+  for (const contact::NodeVector& force : forces)
     for (int a = 0; a < 3; ++a)
       f[axis_of(force.node, a)] = force.value[a];
   solve(f);
@@ -279,4 +281,4 @@ void Compliance::add(std::span<const NodeVector> forces, double allowed, std::sp
     u[r] += f[r];
 }
 
-} // namespace gewebe
+} // namespace gewebe::compliance

@@ -22,7 +22,7 @@
 #include <span>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::compliance {
 
 /// Compliance of one model, with a cache of columns.
 class Compliance {
@@ -35,8 +35,8 @@ public:
   /// \pre check_model(model) passes; the source belongs to the model
   /// \throw Error as ComplianceSource, and if columns of the source have other rows than for the
   /// surface or for all nodes
-  Compliance(const Model& model, std::shared_ptr<ComplianceSource> source, const Context& context,
-             bool bounded, bool may_be_free = false);
+  Compliance(const model::Model& model, std::shared_ptr<ComplianceSource> source,
+             const Context& context, bool bounded, bool may_be_free = false);
   Compliance(const Compliance&) = delete;
   Compliance& operator=(const Compliance&) = delete;
 
@@ -81,7 +81,7 @@ public:
   double entry(std::uint32_t node, int axis, std::size_t row) const;
   /// values += C f at these rows, by columns.
   /// \pre columns_pay for the nodes of the forces; rows are below rows(), with one value for each
-  void add_rows(std::span<const NodeVector> forces, std::span<const std::size_t> rows,
+  void add_rows(std::span<const contact::NodeVector> forces, std::span<const std::size_t> rows,
                 std::span<double> values);
 
   // ---- shapes
@@ -90,18 +90,18 @@ public:
   /// contributions are left out of sums of columns, within `allowed`.
   /// \param forces  ascending, of different nodes
   /// \param allowed  largest error of an entry, mm
-  void add(std::span<const NodeVector> forces, double allowed, std::span<double> u);
+  void add(std::span<const contact::NodeVector> forces, double allowed, std::span<double> u);
 
   /// Compressed columns, if all of the first m nodes that can move have one: parts of sums can be
   /// computed; else null.
-  const CompressedColumns* compressed_rows() const noexcept { return whole_; }
+  const columns::CompressedColumns* compressed_rows() const noexcept { return whole_; }
 
   /// u = C f in place, for right-hand sides over all axes, one after the other.
   void solve(std::span<double> over_axes, std::size_t columns = 1);
 
   /// Bound of the error of an entry of C f by compression of stored columns, mm; 0 for other
   /// columns. `relative` is the requested bound.
-  EntryBound bound(std::span<const NodeVector> forces) const;
+  columns::EntryBound bound(std::span<const contact::NodeVector> forces) const;
 
   // ---- costs
 
@@ -119,8 +119,8 @@ public:
 
   /// What choices depend on: columns in memory, work that is done once. Copies share it.
   struct Past {
-    ColumnCache::Past outer{};
-    std::optional<ColumnCache::Past> inside{};
+    columns::ColumnCache::Past outer{};
+    std::optional<columns::ColumnCache::Past> inside{};
     bool warm = false;
   };
   Past past() const;
@@ -128,26 +128,26 @@ public:
 
   std::uint64_t solves() const noexcept { return solves_; }
   std::uint64_t factors() const { return source_->factors(); } ///< factors computed or loaded
-  const ColumnCache& cache() const noexcept { return cache_; }
+  const columns::ColumnCache& cache() const noexcept { return cache_; }
 
 private:
   /// Compressed columns, if a sum with forces at these nodes needs no others; else null.
-  const CompressedColumns* compressed_for(std::span<const std::uint32_t> nodes) const;
+  const columns::CompressedColumns* compressed_for(std::span<const std::uint32_t> nodes) const;
   bool compressed(std::uint32_t node) const;
   std::size_t capacity() const noexcept; ///< nodes whose columns fit in memory, of the first m
   bool outer(std::uint32_t node) const noexcept { return 3 * std::size_t{node} < rows_; }
-  ColumnSolve columns_of(std::size_t rows);
+  columns::ColumnSolve columns_of(std::size_t rows);
 
   std::size_t axes_;
   std::shared_ptr<ComplianceSource> source_;
-  const CompressedColumns* compressed_; ///< of the source, or null
-  const CompressedColumns* whole_;      ///< see compressed_rows
+  const columns::CompressedColumns* compressed_; ///< of the source, or null
+  const columns::CompressedColumns* whole_;      ///< see compressed_rows
   std::size_t rows_;
   Context context_;
-  ColumnCache cache_;
-  std::optional<ColumnCache> inside_; ///< of the nodes after the first m, if there are any
+  columns::ColumnCache cache_;
+  std::optional<columns::ColumnCache> inside_; ///< of the nodes after the first m, if there are any
   std::uint64_t solves_ = 0;
-  std::optional<SingularStiffness> free_;
+  std::optional<linalg::SingularStiffness> free_;
 };
 
-} // namespace gewebe
+} // namespace gewebe::compliance

@@ -6,7 +6,7 @@
 #include <optional>
 #include <utility>
 
-namespace gewebe {
+namespace gewebe::compliance {
 
 namespace {
 
@@ -15,7 +15,7 @@ class FactorSource final : public ComplianceSource {
 public:
   explicit FactorSource(StoredStiffness stored) : stored_(std::move(stored)) {}
 
-  void open(const Model& model, const Context& context) override {
+  void open(const model::Model& model, const Context& context) override {
     model_ = &model;
     if (stored_.factor)
       return;
@@ -32,16 +32,17 @@ public:
     solver_->solve(over_axes, columns);
   }
   std::size_t entries() const override {
-    return warm_ ? solver_->factor.entries() : costs::usual_entries(3 * model_->nodes.size());
+    return warm_ ? solver_->factor.entries()
+                 : columns::costs::usual_entries(3 * model_->nodes.size());
   }
   std::uint64_t factors() const override { return factors_; }
-  const ColumnSource* columns() const override { return stored_.columns.get(); }
+  const columns::ColumnSource* columns() const override { return stored_.columns.get(); }
   bool is_warm() const override { return warm_; }
   void set_warm(bool warm) override { warm_ = warm; }
 
 private:
   StoredStiffness stored_;
-  const Model* model_ = nullptr;
+  const model::Model* model_ = nullptr;
   std::optional<AxisSolver> solver_;
   bool warm_ = false; ///< it counts as loaded
   std::uint64_t factors_ = 0;
@@ -53,7 +54,7 @@ std::shared_ptr<ComplianceSource> compliance_of_model() {
   return std::make_shared<FactorSource>(StoredStiffness{});
 }
 
-std::shared_ptr<ComplianceSource> compliance_of_factor(std::function<Factor()> factor) {
+std::shared_ptr<ComplianceSource> compliance_of_factor(std::function<linalg::Factor()> factor) {
   return std::make_shared<FactorSource>(StoredStiffness{nullptr, std::move(factor)});
 }
 
@@ -61,4 +62,4 @@ std::shared_ptr<ComplianceSource> compliance_of_store(StoredStiffness stored) {
   return std::make_shared<FactorSource>(std::move(stored));
 }
 
-} // namespace gewebe
+} // namespace gewebe::compliance

@@ -15,7 +15,7 @@
 #include <memory>
 #include <span>
 
-namespace gewebe {
+namespace gewebe::compliance {
 
 class ForwardBlocks;
 
@@ -32,7 +32,7 @@ public:
 
   /// To be called before any solve. Keeps a reference to the model. \pre it is that of this source
   /// \throw Error as factorise_axes, if no factor was made beforehand
-  virtual void open(const Model& model, const Context& context) = 0;
+  virtual void open(const model::Model& model, const Context& context) = 0;
   /// As AxisSolver::solve. The first call loads a factor that was made beforehand.
   /// \throw as AxisSolver::solve
   virtual void solve(std::span<double> over_axes, std::size_t columns) = 0;
@@ -42,7 +42,7 @@ public:
   /// Number of times that K was factorised or its factor loaded.
   virtual std::uint64_t factors() const { return 0; }
   /// Columns of some nodes or of all, or null. They may be read without open.
-  virtual const ColumnSource* columns() const { return nullptr; }
+  virtual const columns::ColumnSource* columns() const { return nullptr; }
   /// Whether work that is done once has been done, on which costs, and so choices, depend. A
   /// rollback restores it; the work stays done.
   virtual bool is_warm() const = 0;
@@ -53,15 +53,15 @@ public:
 
 /// Precomputed columns and factor of a model.
 struct StoredStiffness {
-  std::unique_ptr<ColumnSource> columns; ///< null: of no node
-  std::function<Factor()> factor;        ///< called once, when the factor is first needed
+  std::unique_ptr<columns::ColumnSource> columns; ///< null: of no node
+  std::function<linalg::Factor()> factor;         ///< called once, when the factor is first needed
 };
 
 /// Source without stored data: K is factorised when the source is opened.
 std::shared_ptr<ComplianceSource> compliance_of_model();
 /// Source with a factor of K. \param factor  called when the factor is first needed; not empty
-std::shared_ptr<ComplianceSource> compliance_of_factor(std::function<Factor()> factor);
+std::shared_ptr<ComplianceSource> compliance_of_factor(std::function<linalg::Factor()> factor);
 /// Source with columns and a factor. \pre stored.factor is not empty
 std::shared_ptr<ComplianceSource> compliance_of_store(StoredStiffness stored);
 
-} // namespace gewebe
+} // namespace gewebe::compliance

@@ -2,7 +2,7 @@
 
 #include <cmath>
 
-namespace gewebe {
+namespace gewebe::compliance {
 
 namespace {
 
@@ -108,4 +108,4 @@ void ContactBlock::multiply(std::span<const double> x, std::span<double> y) cons
   }
 }
 
-} // namespace gewebe
+} // namespace gewebe::compliance

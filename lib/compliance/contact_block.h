@@ -8,7 +8,7 @@
 #include <span>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::compliance {
 
 class ContactBlock {
 public:
@@ -41,4 +41,4 @@ private:
   std::vector<double> values_, matrix_; ///< L and C_cc by rows, their lower triangles alone
 };
 
-} // namespace gewebe
+} // namespace gewebe::compliance

@@ -7,7 +7,7 @@
 #include <cmath>
 #include <utility>
 
-namespace gewebe {
+namespace gewebe::compliance {
 
 namespace {
 
@@ -17,14 +17,15 @@ constexpr std::uint64_t max_changes = 1000;
 
 } // namespace
 
-bool ForcesAt::cheaper(const Load& now, std::size_t limit) const {
+bool ForcesAt::cheaper(const contact::Load& now, std::size_t limit) const {
   const std::size_t m = now.displacement.size();
   if (limit != SIZE_MAX)
     return m <= limit;
-  if (m > costs::max_in_block(true))
+  if (m > columns::costs::max_in_block(true))
     return false;
   const std::vector<std::uint32_t> nodes = nodes_of(now.displacement);
-  return compliance_.fit(nodes) && (m <= costs::max_in_block(false) || compliance_.stored(nodes));
+  return compliance_.fit(nodes) &&
+         (m <= columns::costs::max_in_block(false) || compliance_.stored(nodes));
 }
 
 bool ForcesAt::join(std::uint32_t node) {
@@ -36,7 +37,7 @@ bool ForcesAt::join(std::uint32_t node) {
   const ComplianceBlock own = compliance_.block(node, node);
   std::vector<double> row;
   for (std::size_t a = 0; a < 3; ++a) {
-    if (is_fixed(model_, node, static_cast<int>(a)))
+    if (contact::is_fixed(model_, node, static_cast<int>(a)))
       continue;
     contact.axes.push_back(axis_of(node, static_cast<int>(a)));
     row.clear();
@@ -106,21 +107,22 @@ std::vector<std::size_t> ForcesAt::axes() const {
   return all;
 }
 
-std::vector<NodeVector> ForcesAt::by_node(std::span<const double> force) const {
-  std::vector<NodeVector> list;
+std::vector<contact::NodeVector> ForcesAt::by_node(std::span<const double> force) const {
+  std::vector<contact::NodeVector> list;
   std::size_t row = 0;
   for (const Contact& c : *now_.contacts) {
-    NodeVector& f = list.emplace_back(NodeVector{c.node, {}});
+    contact::NodeVector& f = list.emplace_back(contact::NodeVector{c.node, {}});
     for (const std::size_t axis : c.axes)
       f.value[static_cast<int>(axis % 3)] = force[row++];
   }
-  std::sort(list.begin(), list.end(),
-            [](const NodeVector& a, const NodeVector& b) { return a.node < b.node; });
+  std::sort(
+      list.begin(), list.end(),
+      [](const contact::NodeVector& a, const contact::NodeVector& b) { return a.node < b.node; });
   return list;
 }
 
 /// Whether it came out right.
-bool ForcesAt::meet(const Load& now) {
+bool ForcesAt::meet(const contact::Load& now) {
   if (!take_nodes(now.displacement))
     return false;
   const std::vector<std::size_t> where = axes();
@@ -158,8 +160,8 @@ bool ForcesAt::meet(const Load& now) {
 }
 
 /// Combines earlier shapes of rigid motions, if this is a rigid motion. \return whether it is
-bool ForcesAt::shape(const Load& now, std::vector<double>& u) {
-  if (now_.contacts->size() < costs::worth_modes ||
+bool ForcesAt::shape(const contact::Load& now, std::vector<double>& u) {
+  if (now_.contacts->size() < columns::costs::worth_modes ||
       (now_.modes->size() == 0 && !now_.modes->open()))
     return false;
   std::vector<double> coefficients, rest;
@@ -185,4 +187,4 @@ bool ForcesAt::shape(const Load& now, std::vector<double>& u) {
   return true;
 }
 
-} // namespace gewebe
+} // namespace gewebe::compliance

@@ -16,7 +16,7 @@
 #include <span>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::compliance {
 
 /// Reactions of a set of displaced nodes.
 class ForcesAt {
@@ -41,20 +41,20 @@ public:
   void restore(const Past& past) { now_ = past; }
 
   /// Keeps references to all.
-  ForcesAt(const Model& model, Compliance& compliance, LoadAnswer& answer)
+  ForcesAt(const model::Model& model, Compliance& compliance, LoadAnswer& answer)
       : model_(model), compliance_(compliance), answer_(answer) {}
 
   /// Whether this solver is cheaper for a load.
   /// \param limit  number of displaced nodes up to which it is; SIZE_MAX: from the cost model and
   /// the available columns
-  bool cheaper(const Load& now, std::size_t limit) const;
+  bool cheaper(const contact::Load& now, std::size_t limit) const;
   /// Finds the forces. \return whether they produce the displacements
-  bool meet(const Load& now);
+  bool meet(const contact::Load& now);
   /// Reactions under the last load of meet(), by ascending node.
-  std::vector<NodeVector> forces() const { return by_node(*now_.force); }
+  std::vector<contact::NodeVector> forces() const { return by_node(*now_.force); }
   /// The first rows() of the shape under that load, if the displacements are a rigid motion of
   /// these nodes whose shape follows from earlier ones. \return whether it was found
-  bool shape(const Load& now, std::vector<double>& u);
+  bool shape(const contact::Load& now, std::vector<double>& u);
   /// Number of loads with these nodes whose shapes were computed by other means, this one included.
   int shapes() {
     now_.shapes += now_.counted ? 0 : 1;
@@ -76,13 +76,13 @@ private:
   bool join(std::uint32_t node);
   void leave_all();
   bool take_nodes(const std::map<std::uint32_t, Vec3>& nodes);
-  std::vector<NodeVector> by_node(std::span<const double> force) const;
+  std::vector<contact::NodeVector> by_node(std::span<const double> force) const;
 
-  const Model& model_;
+  const model::Model& model_;
   Compliance& compliance_;
   LoadAnswer& answer_;
   Past now_;
   double miss_ = 0;
 };
 
-} // namespace gewebe
+} // namespace gewebe::compliance

@@ -2,7 +2,7 @@
 
 #include <utility>
 
-namespace gewebe {
+namespace gewebe::compliance {
 
 namespace {
 
@@ -10,7 +10,8 @@ constexpr std::size_t max_kept = 1024; ///< nodes; some 50 kB each on 10,000 nod
 
 } // namespace
 
-ForwardBlocks::ForwardBlocks(std::function<FrontalFactor&()> factor) : factor_(std::move(factor)) {}
+ForwardBlocks::ForwardBlocks(std::function<linalg::FrontalFactor&()> factor)
+    : factor_(std::move(factor)) {}
 
 void ForwardBlocks::need(std::span<const std::uint32_t> nodes) {
   std::vector<std::uint32_t> missing;
@@ -23,7 +24,7 @@ void ForwardBlocks::need(std::span<const std::uint32_t> nodes) {
     solves_.clear();
     missing.assign(nodes.begin(), nodes.end());
   }
-  std::vector<FrontalFactor::ForwardSolve> solved = factor_().forward_solves(missing);
+  std::vector<linalg::FrontalFactor::ForwardSolve> solved = factor_().forward_solves(missing);
   for (std::size_t k = 0; k < missing.size(); ++k)
     solves_[missing[k]] = std::move(solved[k]);
 }
@@ -35,7 +36,7 @@ ComplianceBlock ForwardBlocks::block(std::uint32_t node, std::uint32_t other) co
 std::vector<Vec3> ForwardBlocks::answers(std::span<const double> over_axes,
                                          std::span<const std::uint32_t> nodes) {
   need(nodes); // they may have been dropped since
-  FrontalFactor& factor = factor_();
+  linalg::FrontalFactor& factor = factor_();
   (void)factor.carry(over_axes);
   std::vector<Vec3> all;
   all.reserve(nodes.size());
@@ -46,4 +47,4 @@ std::vector<Vec3> ForwardBlocks::answers(std::span<const double> over_axes,
   return all;
 }
 
-} // namespace gewebe
+} // namespace gewebe::compliance

@@ -11,12 +11,12 @@
 #include <unordered_map>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::compliance {
 
 class ForwardBlocks {
 public:
   /// \param factor  always the same one; called whenever it is read
-  explicit ForwardBlocks(std::function<FrontalFactor&()> factor);
+  explicit ForwardBlocks(std::function<linalg::FrontalFactor&()> factor);
 
   /// Prepares blocks between these nodes, and between these and nodes that were needed before.
   /// Earlier nodes may be dropped.
@@ -28,8 +28,8 @@ public:
                             std::span<const std::uint32_t> nodes);
 
 private:
-  std::function<FrontalFactor&()> factor_;
-  std::unordered_map<std::uint32_t, FrontalFactor::ForwardSolve> solves_;
+  std::function<linalg::FrontalFactor&()> factor_;
+  std::unordered_map<std::uint32_t, linalg::FrontalFactor::ForwardSolve> solves_;
 };
 
-} // namespace gewebe
+} // namespace gewebe::compliance

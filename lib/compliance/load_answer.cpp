@@ -6,7 +6,7 @@
 #include <algorithm>
 #include <utility>
 
-namespace gewebe {
+namespace gewebe::compliance {
 
 namespace {
 
@@ -15,10 +15,10 @@ constexpr std::uint64_t max_increments = 1000;
 
 } // namespace
 
-std::vector<double> forces_over_axes(const Model& model, const Load& load) {
+std::vector<double> forces_over_axes(const model::Model& model, const contact::Load& load) {
   std::vector<double> f(3 * model.nodes.size(), 0);
   if (load.gravity != Vec3{})
-    f = weight_of(model, load.gravity);
+    f = fem::weight_of(model, load.gravity);
   for (const auto& [node, force] : load.force)
     for (int a = 0; a < 3; ++a)
       f[axis_of(node, a)] += force[a];
@@ -33,15 +33,15 @@ std::vector<std::uint32_t> nodes_of(const std::map<std::uint32_t, Vec3>& values)
   return nodes;
 }
 
-std::vector<NodeVector> as_vectors(const std::map<std::uint32_t, Vec3>& values) {
-  std::vector<NodeVector> list;
+std::vector<contact::NodeVector> as_vectors(const std::map<std::uint32_t, Vec3>& values) {
+  std::vector<contact::NodeVector> list;
   list.reserve(values.size());
   for (const auto& [node, value] : values)
     list.push_back({node, value});
   return list;
 }
 
-LoadAnswer::LoadAnswer(const Model& model, Compliance& compliance)
+LoadAnswer::LoadAnswer(const model::Model& model, Compliance& compliance)
     : model_(model), compliance_(compliance) {
   now_.answer.write().resize(compliance.rows());
 }
@@ -51,7 +51,7 @@ const std::vector<double>& LoadAnswer::weight(const Vec3& gravity) {
     return weight_;
   std::vector<double> fresh;
   if (gravity != Vec3{}) {
-    Load alone;
+    contact::Load alone;
     alone.gravity = gravity;
     fresh = forces_over_axes(model_, alone);
     compliance_.solve(fresh);
@@ -63,8 +63,9 @@ const std::vector<double>& LoadAnswer::weight(const Vec3& gravity) {
 }
 
 /// Forces that differ from those of the answer, by their difference.
-std::vector<NodeVector> LoadAnswer::changed_forces(const std::map<std::uint32_t, Vec3>& now) const {
-  std::vector<NodeVector> changed;
+std::vector<contact::NodeVector>
+LoadAnswer::changed_forces(const std::map<std::uint32_t, Vec3>& now) const {
+  std::vector<contact::NodeVector> changed;
   const std::map<std::uint32_t, Vec3>& force = *now_.force;
   auto a = force.begin();
   auto b = now.begin();
@@ -86,16 +87,17 @@ std::vector<NodeVector> LoadAnswer::changed_forces(const std::map<std::uint32_t,
 }
 
 /// Whether the answer is found from the last one.
-bool LoadAnswer::follows(const Load& load, std::size_t changed) const {
+bool LoadAnswer::follows(const contact::Load& load, std::size_t changed) const {
   return load.gravity == now_.gravity && changed < load.force.size() &&
          now_.increments < max_increments;
 }
 
-void LoadAnswer::note(const Load& load) {
+void LoadAnswer::note(const contact::Load& load) {
   if (known(load))
     return;
-  std::vector<NodeVector> changed =
-      load.gravity == now_.gravity ? changed_forces(load.force) : std::vector<NodeVector>{};
+  std::vector<contact::NodeVector> changed = load.gravity == now_.gravity
+                                                 ? changed_forces(load.force)
+                                                 : std::vector<contact::NodeVector>{};
   if (follows(load, changed.size())) {
     now_.pending.write().push_back(std::move(changed));
     ++now_.increments;
@@ -122,19 +124,19 @@ void LoadAnswer::settle() {
     now_.fresh = {};
   }
   const auto pending = std::exchange(now_.pending, {});
-  for (const std::vector<NodeVector>& changed : *pending)
+  for (const std::vector<contact::NodeVector>& changed : *pending)
     compliance_.add(changed, 0, now_.answer.write());
   now_.gravity = gravity;
 }
 
-const std::vector<double>& LoadAnswer::whole(const Load& load) {
+const std::vector<double>& LoadAnswer::whole(const contact::Load& load) {
   note(load);
   settle();
   return *now_.answer;
 }
 
 /// The answer over all axes, by a solve.
-const std::vector<double>& LoadAnswer::everywhere(const Load& load) {
+const std::vector<double>& LoadAnswer::everywhere(const contact::Load& load) {
   if (!everywhere_.empty() && load.gravity == solved_.gravity && load.force == solved_.force)
     return everywhere_;
   everywhere_.clear(); // should the solve fail
@@ -147,7 +149,7 @@ const std::vector<double>& LoadAnswer::everywhere(const Load& load) {
   return everywhere_;
 }
 
-std::vector<double> LoadAnswer::at(const Load& load, std::span<const std::size_t> rows) {
+std::vector<double> LoadAnswer::at(const contact::Load& load, std::span<const std::size_t> rows) {
   std::vector<double> values;
   values.reserve(rows.size());
   if (std::any_of(rows.begin(), rows.end(),
@@ -172,11 +174,12 @@ std::vector<double> LoadAnswer::at(const Load& load, std::span<const std::size_t
   return values;
 }
 
-std::vector<double> LoadAnswer::at_blocks(const Load& load, std::span<const std::size_t> rows) {
+std::vector<double> LoadAnswer::at_blocks(const contact::Load& load,
+                                          std::span<const std::size_t> rows) {
   const bool columns = compliance_.columns_pay(nodes_of(load.force));
   if (!compliance_.carries() || (columns && load.gravity == Vec3{}))
     return at(load, rows);
-  Load carried;
+  contact::Load carried;
   carried.gravity = load.gravity;
   if (!columns)
     carried.force = load.force;
@@ -203,4 +206,4 @@ std::vector<double> LoadAnswer::at_blocks(const Load& load, std::span<const std:
   return values;
 }
 
-} // namespace gewebe
+} // namespace gewebe::compliance

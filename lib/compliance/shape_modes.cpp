@@ -3,7 +3,7 @@
 #include <cmath>
 #include <utility>
 
-namespace gewebe {
+namespace gewebe::compliance {
 
 namespace {
 
@@ -54,4 +54,4 @@ void ShapeModes::answer(std::span<const double> coefficients, std::span<double> 
       answer[r] += coefficients[k] * (*answers_[k])[r];
 }
 
-} // namespace gewebe
+} // namespace gewebe::compliance

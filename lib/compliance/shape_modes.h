@@ -9,7 +9,7 @@
 #include <span>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::compliance {
 
 /// Basis of inputs and their outputs. A copy shares both.
 class ShapeModes {
@@ -41,4 +41,4 @@ private:
   bool given_up_ = false;
 };
 
-} // namespace gewebe
+} // namespace gewebe::compliance

@@ -223,7 +223,7 @@ BarrierValue barrier(double s, double range) {
     return {infinity, -infinity, infinity};
   if (s >= range)
     return {};
-  const double away = s - range, log = natural_logarithm(s / range), part = away / s;
+  const double away = s - range, log = numeric::natural_logarithm(s / range), part = away / s;
   return {-away * away * log, -away * (2 * log + part), -2 * log - part * 4 + part * part};
 }
 

@@ -74,7 +74,7 @@ struct InverseCache::State {
   std::list<Inverse> inverses; ///< last used first
   // Memory of systems: that of a new one would be pages to be cleared.
   std::vector<double> hessian, matrix;
-  BlockCholesky cholesky;
+  cholesky::BlockCholesky cholesky;
 };
 
 InverseCache::InverseCache() : state_(std::make_unique<State>()) {}
@@ -300,8 +300,8 @@ struct CondensedSystem::State {
     for (;;) {
       MatrixXd shifted = w;
       shifted.diagonal().array() += shift;
-      if (invert({shifted.data(), static_cast<std::size_t>(shifted.size())},
-                 static_cast<std::size_t>(order), cpu) &&
+      if (cholesky::invert({shifted.data(), static_cast<std::size_t>(shifted.size())},
+                           static_cast<std::size_t>(order), cpu) &&
           shifted.allFinite()) {
         w = std::move(shifted);
         break;
@@ -517,7 +517,7 @@ void CondensedSystem::choose_reach(double reach) {
   s.reach = s.c > 0 ? reach : 1;
   const auto& [still, whole] = s.direction;
   s.p = still.p + s.reach * whole.p;
-  const auto combine = [&](auto of, std::vector<Vec3>& to) {
+  const auto combine = [&](auto of, std::vector<gewebe::Vec3>& to) {
     for (std::size_t k = 0; k < to.size(); ++k)
       to[k] = (still.*of)[k] + s.reach * (whole.*of)[k];
   };

@@ -156,7 +156,7 @@ std::vector<std::uint32_t> ContactEnergy::friction_vertices() const {
 
 std::vector<ContactForce> ContactEnergy::forces(std::span<const Vec3> x) const {
   std::map<std::pair<std::uint32_t, std::uint32_t>, ContactForce> all;
-  const auto add = [&](const auto& pair, const std::array<Vec3, 4>& forces, bool normal) {
+  const auto add = [&](const auto& pair, const std::array<gewebe::Vec3, 4>& forces, bool normal) {
     const std::vector<std::uint32_t>& owner = island_.surface.owner;
     const std::uint32_t one = owner[pair.vertex[0]];
     std::uint32_t other = one;

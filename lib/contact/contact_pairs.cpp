@@ -108,7 +108,7 @@ void find_active_pairs(const collision::CollisionSurface& surface,
       constexpr std::size_t n = std::tuple_size_v<std::remove_cvref_t<decltype(vertices)>>;
       const double d_min = collision::radius_sum(surface, vertices.front(), vertices.back());
       const double range = d_min + d_hat;
-      std::array<Vec3, n> y;
+      std::array<gewebe::Vec3, n> y;
       for (std::size_t k = 0; k < n; ++k)
         y[k] = x[vertices[k]];
       if (are_apart(y, first, range))
@@ -120,7 +120,7 @@ void find_active_pairs(const collision::CollisionSurface& surface,
       bool mollified = false;
       if constexpr (n == 4) {
         if (first == 2) {
-          std::array<Vec3, 4> rest;
+          std::array<gewebe::Vec3, 4> rest;
           for (std::size_t k = 0; k < n; ++k)
             rest[k] = surface.rest[vertices[k]];
           const double eps_x = collision::edge_edge_mollifier_threshold(rest);

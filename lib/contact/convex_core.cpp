@@ -10,7 +10,7 @@
 #include <string>
 #include <utility>
 
-namespace gewebe {
+namespace gewebe::contact {
 
 namespace {
 
@@ -22,7 +22,7 @@ constexpr double straight = 1e-9;
 constexpr double rounding = 1e-12;
 
 std::string text_of(const Vec3& p) {
-  return rounded_text(p.x) + " " + rounded_text(p.y) + " " + rounded_text(p.z);
+  return text::rounded_text(p.x) + " " + text::rounded_text(p.y) + " " + text::rounded_text(p.z);
 }
 
 struct Plane {
@@ -49,7 +49,7 @@ public:
       }
     size_ = norm(box.size());
     turn_out(sum / (3 * static_cast<double>(all_.size())));
-    edges_ = edge_table(all_, points_.size());
+    edges_ = mesh::edge_table(all_, points_.size());
     require_closed();
     require_convex();
   }
@@ -109,7 +109,7 @@ public:
       for (const std::uint32_t corner : t)
         if (const double height = plane.height(points_[corner]); !(height <= convex * size_))
           throw Error("is not convex: the point " + text_of(points_[corner]) + " is " +
-                      rounded_text(height) + " mm beyond the plane of the triangle " +
+                      text::rounded_text(height) + " mm beyond the plane of the triangle " +
                       std::to_string(triangle));
   }
   /// How deep it is behind a plane.
@@ -157,7 +157,7 @@ private:
       const double height = plane_[one / 3].height(points_[all_[other / 3][other % 3]]);
       if (!(height <= convex * size_))
         throw Error("is not convex at " + ends_of(e) + ": one of its triangles is " +
-                    rounded_text(height) + " mm beyond the other's plane");
+                    text::rounded_text(height) + " mm beyond the other's plane");
     }
   }
   bool in_plane(const Plane& plane, std::uint32_t triangle) const {
@@ -180,7 +180,7 @@ private:
   std::vector<Triangle> all_;
   std::vector<Plane> plane_;
   std::vector<double> area_; ///< twice
-  EdgeTable edges_;
+  mesh::EdgeTable edges_;
   double size_ = 0;
 };
 
@@ -233,9 +233,9 @@ ConvexCore::ConvexCore(const TriangleMesh& mesh) {
     loops.push_back(std::move(loop));
   }
   if (!(thickness >= thin * size))
-    throw Error("is flat, " + rounded_text(thickness) +
-                " mm thick, expected at least a thousandth of its size, " + rounded_text(size) +
-                " mm");
+    throw Error("is flat, " + text::rounded_text(thickness) +
+                " mm thick, expected at least a thousandth of its size, " +
+                text::rounded_text(size) + " mm");
   // Points between two faces on a straight edge are no corners.
   std::map<std::uint32_t, std::vector<std::array<std::uint32_t, 2>>> around; // neighbours by face
   for (const std::vector<std::uint32_t>& loop : loops)
@@ -314,4 +314,4 @@ ConvexCore::Nearest ConvexCore::nearest(const Vec3& p) const {
   return found;
 }
 
-} // namespace gewebe
+} // namespace gewebe::contact

@@ -12,7 +12,7 @@
 #include <span>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::contact {
 
 class ConvexCore {
 public:
@@ -63,4 +63,4 @@ private:
 /// Weights of a and b at the point between them that is nearest to p.
 std::array<double, 2> weights_on_segment(const Vec3& p, const Vec3& a, const Vec3& b);
 
-} // namespace gewebe
+} // namespace gewebe::contact

@@ -13,7 +13,7 @@
 
 #include <cmath>
 
-namespace gewebe {
+namespace gewebe::contact {
 
 struct Coupling {
   double stiffness = 1; ///< K, g/s² (1e-6 N/mm), > 0
@@ -41,4 +41,4 @@ struct CouplingStep {
 /// Part of the radius. An instrument that moves no further than this in a step is at rest.
 inline constexpr double led_to_rest = 1e-9;
 
-} // namespace gewebe
+} // namespace gewebe::contact

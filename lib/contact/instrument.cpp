@@ -6,7 +6,7 @@
 #include <algorithm>
 #include <cmath>
 
-namespace gewebe {
+namespace gewebe::contact {
 
 namespace {
 
@@ -164,4 +164,4 @@ double path_length(const InstrumentShape& shape, const Pose& from, const Pose& t
   return norm(to.place - from.place) + 3.2 * sine * reach_of(shape);
 }
 
-} // namespace gewebe
+} // namespace gewebe::contact

@@ -9,7 +9,7 @@
 #include <cstdint>
 #include <memory>
 
-namespace gewebe {
+namespace gewebe::contact {
 
 /// A rotation; need not be of unit length until made so.
 struct Quaternion {
@@ -111,4 +111,4 @@ inline bool near(const Box3& a, const Box3& b, double margin = 0) {
          a.min.z - margin <= b.max.z && b.min.z - margin <= a.max.z;
 }
 
-} // namespace gewebe
+} // namespace gewebe::contact

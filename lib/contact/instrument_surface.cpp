@@ -8,7 +8,7 @@
 #include <cstdint>
 #include <utility>
 
-namespace gewebe {
+namespace gewebe::contact {
 
 namespace {
 
@@ -148,4 +148,4 @@ bool same_surface(const InstrumentShape& a, const InstrumentShape& b) {
          (a.core == b.core || (a.core && b.core && *a.core == *b.core));
 }
 
-} // namespace gewebe
+} // namespace gewebe::contact

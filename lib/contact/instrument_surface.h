@@ -8,7 +8,7 @@
 #include <cstddef>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::contact {
 
 struct InstrumentSurface {
   std::vector<Vec3> points;  ///< all of them on the surface
@@ -40,4 +40,4 @@ double shown_radius(const InstrumentShape& shape);
 /// Whether both have one surface around their own origin.
 bool same_surface(const InstrumentShape& a, const InstrumentShape& b);
 
-} // namespace gewebe
+} // namespace gewebe::contact

@@ -52,7 +52,7 @@ bool passes(const Vec3& p, const Vec3& q, const Vec3& a, const Vec3& b, const Ve
 
 } // namespace
 
-ModelSurface model_surface(const Model& model) {
+ModelSurface model_surface(const model::Model& model) {
   ModelSurface all;
   std::vector<std::uint32_t> vertex(model.nodes.size(), UINT32_MAX);
   for (const Triangle& t : model.triangles)
@@ -64,7 +64,7 @@ ModelSurface model_surface(const Model& model) {
     vertex[node] = static_cast<std::uint32_t>(all.node.size());
     all.node.push_back(node);
     all.surface.rest.push_back(model.nodes[node].position);
-    all.surface.fixed.push_back(model.nodes[node].fixed == fixed_all ? 1 : 0);
+    all.surface.fixed.push_back(model.nodes[node].fixed == model::fixed_all ? 1 : 0);
   }
   for (const Triangle& t : model.triangles)
     all.surface.triangles.push_back({vertex[t[0]], vertex[t[1]], vertex[t[2]]});
@@ -72,7 +72,7 @@ ModelSurface model_surface(const Model& model) {
   return all;
 }
 
-TypicalContact typical_contact(const Model& model) {
+TypicalContact typical_contact(const model::Model& model) {
   double edges = 0;
   std::size_t count = 0;
   for (const Triangle& t : model.triangles)
@@ -85,9 +85,9 @@ TypicalContact typical_contact(const Model& model) {
   const double edge = edges / static_cast<double>(count);
   double stiffness = HUGE_VAL; // of a piece of the size of an edge
   if (!model.tetrahedra.empty())
-    for (const Material& m : model.materials)
+    for (const model::Material& m : model.materials)
       stiffness = m.young > 0 ? std::min(stiffness, m.young * edge) : stiffness;
-  for (const Spring& spring : model.springs)
+  for (const model::Spring& spring : model.springs)
     stiffness = spring.stiffness > 0 ? std::min(stiffness, spring.stiffness) : stiffness;
   if (!std::isfinite(stiffness))
     return {};

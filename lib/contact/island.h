@@ -42,14 +42,14 @@ struct TypicalContact {
   double stiffness = 0; ///< of a piece of the size of an edge, 1e-6 N/mm
   double force = 0;     ///< strains such a piece by a hundredth, 1e-6 N
 };
-TypicalContact typical_contact(const Model& model);
+TypicalContact typical_contact(const model::Model& model);
 /// Surface of a model: its triangles, with nodes of the model as vertices.
 struct ModelSurface {
   BodySurface surface;
   std::vector<std::uint32_t> node; ///< by vertex, ascending
   TypicalContact typical;
 };
-ModelSurface model_surface(const Model& model);
+ModelSurface model_surface(const model::Model& model);
 /// A point, an edge or the triangles of a convex core, at its own pose. \pre no blade
 BodySurface instrument_surface(const InstrumentShape& shape);
 

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::contact {
 
 double Load::changes_until() const {
   if (!force_period.empty())
@@ -20,7 +20,7 @@ double Load::changes_until() const {
 namespace {
 
 /// Flags of the nodes that are middles of quadratic elements; empty where there is none.
-std::vector<std::uint8_t> middles_of(const Model& model) {
+std::vector<std::uint8_t> middles_of(const model::Model& model) {
   std::vector<std::uint8_t> flags(model.middles.empty() ? 0 : model.nodes.size());
   for (const EdgeMiddles& middles : model.middles)
     for (const std::uint32_t middle : middles)
@@ -30,7 +30,7 @@ std::vector<std::uint8_t> middles_of(const Model& model) {
 
 } // namespace
 
-Load load_at(const Load& load, const Model& model, double time) {
+Load load_at(const Load& load, const model::Model& model, double time) {
   Load now{.force = load.force, .displacement = load.displacement, .gravity = load.gravity};
   for (const auto& [node, period] : load.force_period)
     now.force[node] *= pulse(time, period);
@@ -43,7 +43,7 @@ Load load_at(const Load& load, const Model& model, double time) {
   return now;
 }
 
-std::vector<PressedCorner> pressed_corners(const Load& load, const Model& model) {
+std::vector<PressedCorner> pressed_corners(const Load& load, const model::Model& model) {
   std::vector<PressedCorner> all;
   if (load.pressure.empty())
     return all;
@@ -65,4 +65,4 @@ std::vector<PressedCorner> pressed_corners(const Load& load, const Model& model)
   return all;
 }
 
-} // namespace gewebe
+} // namespace gewebe::contact

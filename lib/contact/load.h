@@ -13,7 +13,7 @@
 #include <span>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::contact {
 
 /// A node's own vector.
 struct NodeVector {
@@ -91,7 +91,7 @@ struct Load {
 
 /// The load at one time: forces without a period, with the pressures among them, along the normals
 /// at rest, and displacements.
-Load load_at(const Load& load, const Model& model, double time);
+Load load_at(const Load& load, const model::Model& model, double time);
 
 /// A corner of a triangle under a pressure, and the nodes that carry its force. On a quadratic face
 /// these are the middles of its edges: an even traction puts a third of the force on each middle
@@ -102,7 +102,7 @@ struct PressedCorner {
   std::array<std::uint32_t, 3> bearers{};
   std::uint32_t count = 0; ///< of bearers
 };
-std::vector<PressedCorner> pressed_corners(const Load& load, const Model& model);
+std::vector<PressedCorner> pressed_corners(const Load& load, const model::Model& model);
 
 /// Calls add(node, force) for all that pressures do at a time, with nodes where place(node) says.
 template <class Place, class Add>
@@ -117,8 +117,8 @@ void press(std::span<const PressedCorner> corners, double time, Place&& place, A
 }
 
 /// Whether the model holds `node` along `axis` (0 to 2).
-inline bool is_fixed(const Model& model, std::size_t node, int axis) {
+inline bool is_fixed(const model::Model& model, std::size_t node, int axis) {
   return (model.nodes[node].fixed >> axis & 1) != 0;
 }
 
-} // namespace gewebe
+} // namespace gewebe::contact

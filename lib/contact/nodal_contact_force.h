@@ -9,7 +9,7 @@
 #include <utility>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::contact {
 
 /// In place of an instrument's number: a surface, of another object or the object's own.
 inline constexpr std::uint32_t other_surface = UINT32_MAX;
@@ -35,4 +35,4 @@ inline std::vector<NodalContactForce> sums_of(std::vector<NodalContactForce> for
   return sums;
 }
 
-} // namespace gewebe
+} // namespace gewebe::contact

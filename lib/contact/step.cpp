@@ -23,7 +23,7 @@ constexpr double stuck = 1e-12;
 constexpr double rounding = 1e-13;
 
 std::string place_text(const Vec3& at) {
-  return rounded_text(at.x) + " " + rounded_text(at.y) + " " + rounded_text(at.z);
+  return text::rounded_text(at.x) + " " + text::rounded_text(at.y) + " " + text::rounded_text(at.z);
 }
 
 std::vector<Vec3> read_positions(const BodyTable& table) {

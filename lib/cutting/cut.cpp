@@ -12,7 +12,7 @@
 #include <tuple>
 #include <utility>
 
-namespace gewebe {
+namespace gewebe::cutting {
 
 namespace {
 
@@ -39,8 +39,8 @@ std::vector<T> joined(const std::vector<T>& a, const std::vector<T>& b) {
 
 class Cutter {
 public:
-  Cutter(const Model& model, const Cut& cut)
-      : model_(model), cut_(cut), surface_(surface_count(model)), part_(near(model, cut)),
+  Cutter(const model::Model& model, const Cut& cut)
+      : model_(model), cut_(cut), surface_(model::surface_count(model)), part_(near(model, cut)),
         edges_(part_.edges) {}
 
   CutModel work() {
@@ -62,22 +62,22 @@ private:
     std::vector<std::uint32_t> corners;
   };
 
-  static constexpr std::size_t no_edge = EdgeTable::no_edge;
+  static constexpr std::size_t no_edge = mesh::EdgeTable::no_edge;
 
   /// The surface that the cut may change. A node that comes apart is an end of something severed,
   /// or belongs to a triangle that vanishes; bending springs across edges of its triangles matter.
-  static SurfacePart near(const Model& model, const Cut& cut) {
+  static model::SurfacePart near(const model::Model& model, const Cut& cut) {
     std::vector<std::uint8_t> marked(model.nodes.size());
     for (const std::size_t s : cut.springs)
-      if (s < model.springs.size() && model.springs[s].kind == SpringKind::edge)
+      if (s < model.springs.size() && model.springs[s].kind == model::SpringKind::edge)
         marked[model.springs[s].i] = marked[model.springs[s].j] = 1;
     for (const Pair& ends : cut.edges)
       for (const std::uint32_t node : ends)
         if (node < marked.size())
           marked[node] = 1;
-    mark_neighbours(model, marked);
-    mark_neighbours(model, marked);
-    return surface_part(model, marked);
+    model::mark_neighbours(model, marked);
+    model::mark_neighbours(model, marked);
+    return model::surface_part(model, marked);
   }
 
   std::uint32_t node_of(std::uint32_t corner) const {
@@ -122,9 +122,9 @@ private:
       area_[t] = norm(cross(model_.nodes[c[1]].position - a, model_.nodes[c[2]].position - a)) / 2;
     }
     for (const std::size_t s : cut_.springs) {
-      const Spring& spring = model_.springs[s];
+      const model::Spring& spring = model_.springs[s];
       const std::size_t e =
-          spring.kind == SpringKind::edge ? part_.edges.find({spring.i, spring.j}) : no_edge;
+          spring.kind == model::SpringKind::edge ? part_.edges.find({spring.i, spring.j}) : no_edge;
       if (e == no_edge)
         continue;
       for (const std::uint32_t c : edges_.around(e)) {
@@ -211,7 +211,7 @@ private:
   }
 
   void nodes() {
-    Model& m = result_.model;
+    model::Model& m = result_.model;
     m.name = model_.name;
     m.materials = model_.materials;
     const std::size_t count = model_.nodes.size() + copies_.size();
@@ -230,7 +230,7 @@ private:
     for (const auto& [node, pieces] : fans_)
       share(pieces);
     for (std::size_t i = 0; i < count; ++i) {
-      Node node = model_.nodes[result_.origin[i]];
+      model::Node node = model_.nodes[result_.origin[i]];
       node.mass *= result_.share[i];
       node.drag *= result_.share[i];
       if (node.central >= 0)
@@ -259,8 +259,8 @@ private:
   // ---- springs
 
   /// Springs that keep their ends keep their order; others are put among them in the end.
-  void add(const Spring& from, const Pair& ends, double part) {
-    Spring s = from;
+  void add(const model::Spring& from, const Pair& ends, double part) {
+    model::Spring s = from;
     s.i = std::min(ends[0], ends[1]);
     s.j = std::max(ends[0], ends[1]);
     s.stiffness *= part;
@@ -270,7 +270,7 @@ private:
   }
 
   /// A spring in parts, whose weights are not negative; it is gone if there is none.
-  void add_parts(const Spring& from, std::vector<std::pair<Pair, double>>& parts) {
+  void add_parts(const model::Spring& from, std::vector<std::pair<Pair, double>>& parts) {
     if (parts.empty()) {
       ++result_.removed;
       return;
@@ -294,7 +294,7 @@ private:
       crossed[i] = crossed[j] = 1;
     std::size_t edge = 0;
     for (std::size_t s = 0; s < model_.springs.size(); ++s) {
-      const Spring& spring = model_.springs[s];
+      const model::Spring& spring = model_.springs[s];
       if (gone_[s] != 0) {
         ++result_.removed;
         continue;
@@ -303,9 +303,9 @@ private:
         add(spring, {number(spring.i), number(spring.j)}, 1);
         continue;
       }
-      if (spring.kind == SpringKind::central) {
+      if (spring.kind == model::SpringKind::central) {
         central_spring(spring);
-      } else if (spring.kind == SpringKind::bend) {
+      } else if (spring.kind == model::SpringKind::bend) {
         bend_spring(spring, across);
       } else {
         const Pair ends{spring.i, spring.j};
@@ -320,10 +320,10 @@ private:
           free_spring(spring);
       }
     }
-    const auto before = [](const Spring& a, const Spring& b) {
+    const auto before = [](const model::Spring& a, const model::Spring& b) {
       return std::tie(a.kind, a.i, a.j) < std::tie(b.kind, b.i, b.j);
     };
-    std::vector<Spring>& all = result_.model.springs;
+    std::vector<model::Spring>& all = result_.model.springs;
     std::sort(moved_.begin(), moved_.end(), before);
     const auto kept = static_cast<std::ptrdiff_t>(all.size());
     all.insert(all.end(), moved_.begin(), moved_.end());
@@ -337,7 +337,7 @@ private:
   }
 
   /// \return false if no triangle is left beside it
-  bool edge_spring(const Spring& spring, std::size_t edge) {
+  bool edge_spring(const model::Spring& spring, std::size_t edge) {
     std::vector<std::pair<Pair, double>> parts;
     for (const std::uint32_t c : edges_.around(edge)) {
       if (vanished_[c / 3] != 0)
@@ -373,7 +373,8 @@ private:
     return all;
   }
 
-  void bend_spring(const Spring& spring, const std::vector<std::array<std::uint32_t, 3>>& across) {
+  void bend_spring(const model::Spring& spring,
+                   const std::vector<std::array<std::uint32_t, 3>>& across) {
     auto at = std::lower_bound(across.begin(), across.end(),
                                std::array<std::uint32_t, 3>{spring.i, spring.j, 0});
     bool known = false;
@@ -402,7 +403,7 @@ private:
     return area;
   }
 
-  void central_spring(const Spring& spring) {
+  void central_spring(const model::Spring& spring) {
     std::vector<std::pair<Pair, double>> parts;
     const auto fan = fans_.find(spring.i);
     if (fan == fans_.end()) {
@@ -443,7 +444,7 @@ private:
     return best;
   }
 
-  void free_spring(const Spring& spring) {
+  void free_spring(const model::Spring& spring) {
     const std::uint32_t i = copy_towards(spring.i, spring.j), j = copy_towards(spring.j, spring.i);
     if (i == none || j == none)
       ++result_.removed;
@@ -485,16 +486,18 @@ private:
     std::uint32_t next = 0;
     for (std::size_t t = 0; t < renumbered.size(); ++t)
       renumbered[t] = vanished_[t] != 0 ? none : next++;
-    const std::vector<Spring>& springs = result_.model.springs;
+    const std::vector<model::Spring>& springs = result_.model.springs;
     for (const Cut::Side& side : cut_.sides) {
       if (vanished_[side.corner / 3] != 0 || side.other >= model_.nodes.size())
         continue;
       const Pair ends = ordered(node_at_[side.corner], number(side.other));
-      for (const SpringKind kind : {SpringKind::edge, SpringKind::bend, SpringKind::central}) {
+      for (const model::SpringKind kind :
+           {model::SpringKind::edge, model::SpringKind::bend, model::SpringKind::central}) {
         const auto key = std::tie(kind, ends[0], ends[1]);
-        const auto at = std::lower_bound(
-            springs.begin(), springs.end(), key,
-            [](const Spring& s, const auto& k) { return std::tie(s.kind, s.i, s.j) < k; });
+        const auto at = std::lower_bound(springs.begin(), springs.end(), key,
+                                         [](const gewebe::model::Spring& s, const auto& k) {
+                                           return std::tie(s.kind, s.i, s.j) < k;
+                                         });
         if (at != springs.end() && std::tie(at->kind, at->i, at->j) == key)
           result_.left.sides.push_back(
               {3 * renumbered[side.corner / 3] + side.corner % 3, number(side.other)});
@@ -503,11 +506,11 @@ private:
     std::sort(result_.left.sides.begin(), result_.left.sides.end());
   }
 
-  const Model& model_;
+  const model::Model& model_;
   const Cut& cut_;
   std::size_t surface_ = 0;
-  SurfacePart part_;
-  const EdgeTable& edges_;
+  model::SurfacePart part_;
+  const mesh::EdgeTable& edges_;
   std::vector<std::uint8_t> gone_;                   ///< by spring
   std::vector<std::uint8_t> opened_;                 ///< by edge
   std::vector<std::uint8_t> vanished_;               ///< by triangle
@@ -516,7 +519,7 @@ private:
   std::vector<std::uint32_t> node_at_;               ///< by corner: its node now
   std::map<std::uint32_t, std::vector<Piece>> fans_; ///< of doubled nodes, what keeps it first
   std::vector<std::uint32_t> copies_;                ///< by copy: its node
-  std::vector<Spring> moved_;                        ///< with ends that they had not before
+  std::vector<model::Spring> moved_;                 ///< with ends that they had not before
   CutModel result_;
 };
 
@@ -526,24 +529,24 @@ Cut merged(const Cut& a, const Cut& b) {
   return {joined(a.springs, b.springs), joined(a.edges, b.edges), joined(a.sides, b.sides)};
 }
 
-void require_held(const Model& before, const CutModel& cut) {
-  const std::size_t surface = surface_count(before);
+void require_held(const model::Model& before, const CutModel& cut) {
+  const std::size_t surface = model::surface_count(before);
   std::vector<std::uint8_t> held(before.nodes.size());
-  for (const Spring& s : cut.model.springs)
+  for (const model::Spring& s : cut.model.springs)
     for (const std::uint32_t i : {s.i, s.j})
       held[cut.origin[i]] = 1;
-  for (const Spring& s : before.springs)
+  for (const model::Spring& s : before.springs)
     for (const std::uint32_t i : {s.i, s.j})
-      if (i < surface && held[i] == 0 && before.nodes[i].fixed != fixed_none)
+      if (i < surface && held[i] == 0 && before.nodes[i].fixed != model::fixed_none)
         throw Error("node " + std::to_string(i) +
                     " is fixed and would lose its last spring, expected a cut that leaves it one");
 }
 
-CutModel cut_model(const Model& model, const Cut& cut) {
+CutModel cut_model(const model::Model& model, const Cut& cut) {
   if (!model.tetrahedra.empty())
     throw Error("the model holds " + std::to_string(model.tetrahedra.size()) +
                 " tetrahedra, expected springs and triangles alone to cut");
   return Cutter(model, cut).work();
 }
 
-} // namespace gewebe
+} // namespace gewebe::cutting

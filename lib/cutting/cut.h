@@ -18,7 +18,7 @@
 #include <utility>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::cutting {
 
 /// Springs and edges of a model to be severed. Lists ascend, without repetitions.
 struct Cut {
@@ -55,7 +55,7 @@ struct CutModel {
     bool operator==(const Between&) const = default;
   };
 
-  Model model;
+  model::Model model;
   /// By node: the former node that it is, or is a copy of; for a node between others that with the
   /// largest share.
   std::vector<std::uint32_t> origin;
@@ -82,14 +82,14 @@ struct CutModel {
 /// Time is a few passes over the model, plus work in proportion to the size of the cut. The result
 /// passes check_model. \pre check_model(model) passes
 /// \throw Error if a spring or edge does not exist
-CutModel cut_model(const Model& model, const Cut& cut);
+CutModel cut_model(const model::Model& model, const Cut& cut);
 
 /// \throw Error if a node of the surface that the model holds has lost its last spring
-void require_held(const Model& before, const CutModel& cut);
+void require_held(const model::Model& before, const CutModel& cut);
 
 /// Some nodes of a model as a model of their own.
 struct ModelPart {
-  Model model;
+  model::Model model;
   std::vector<std::uint32_t> origin; ///< by node: its number in the whole
 };
 
@@ -104,9 +104,9 @@ struct FreeParts {
 /// held along any axis. If no part is held, the one with the most nodes stays (ties: the one with
 /// the smallest node). Central nodes are left out if they can move and no spring holds them, or if
 /// no node belongs to them. Parts have no embedded surface (cutting/skin_parts.h adds it).
-FreeParts free_parts(const Model& before, const CutModel& cut);
+FreeParts free_parts(const model::Model& before, const CutModel& cut);
 
 /// The cut model without the parts that came off, as one step from the model before.
 CutModel without_parts(CutModel cut, std::optional<ModelPart> rest);
 
-} // namespace gewebe
+} // namespace gewebe::cutting

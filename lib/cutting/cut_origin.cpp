@@ -7,7 +7,7 @@
 #include <string>
 #include <tuple>
 
-namespace gewebe {
+namespace gewebe::cutting {
 
 namespace {
 
@@ -18,7 +18,7 @@ bool before_in_space(const Vec3& a, const Vec3& b) {
 /// Places that nodes of either model are at, numbered.
 class Places {
 public:
-  explicit Places(const Model& model) : order_(model.nodes.size()), nodes_(model.nodes) {
+  explicit Places(const model::Model& model) : order_(model.nodes.size()), nodes_(model.nodes) {
     std::iota(order_.begin(), order_.end(), 0U);
     std::stable_sort(order_.begin(), order_.end(), [&](std::uint32_t a, std::uint32_t b) {
       return before_in_space(nodes_[a].position, nodes_[b].position);
@@ -37,21 +37,21 @@ public:
 
 private:
   std::vector<std::uint32_t> order_;
-  const std::vector<Node>& nodes_;
+  const std::vector<model::Node>& nodes_;
 };
 
 /// Where the other ends of a node's springs are, in order.
-std::vector<Vec3> ends(const Model& model, std::uint32_t node) {
+std::vector<Vec3> ends(const model::Model& model, std::uint32_t node) {
   std::vector<Vec3> ends;
-  for (const Spring& s : model.springs)
+  for (const model::Spring& s : model.springs)
     if (s.i == node || s.j == node)
       ends.push_back(model.nodes[s.i == node ? s.j : s.i].position);
   std::sort(ends.begin(), ends.end(), before_in_space);
   return ends;
 }
 
-std::uint32_t max_alike(const Model& before, const Model& after, const std::uint32_t* first,
-                        const std::uint32_t* last, std::uint32_t node) {
+std::uint32_t max_alike(const model::Model& before, const model::Model& after,
+                        const std::uint32_t* first, const std::uint32_t* last, std::uint32_t node) {
   const std::vector<Vec3> own = ends(after, node);
   std::uint32_t best = *first;
   std::size_t max = 0;
@@ -70,11 +70,11 @@ std::uint32_t max_alike(const Model& before, const Model& after, const std::uint
 
 } // namespace
 
-CutOrigin find_cut_origin(const Model& before, const Model& after) {
+CutOrigin find_cut_origin(const model::Model& before, const model::Model& after) {
   const Places places(before);
   CutOrigin cut;
   cut.place.assign(before.nodes.size(), gone_node);
-  const std::size_t surface = std::min(surface_count(before), surface_count(after));
+  const std::size_t surface = std::min(model::surface_count(before), model::surface_count(after));
   for (std::uint32_t node = 0; node < after.nodes.size(); ++node) {
     const Vec3& position = after.nodes[node].position;
     const auto [first, last] = places.at(position);
@@ -94,4 +94,4 @@ CutOrigin find_cut_origin(const Model& before, const Model& after) {
   return cut;
 }
 
-} // namespace gewebe
+} // namespace gewebe::cutting

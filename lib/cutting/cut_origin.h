@@ -6,7 +6,7 @@
 #include <cstdint>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::cutting {
 
 /// An old node that the later model has no copy of.
 inline constexpr std::uint32_t gone_node = UINT32_MAX;
@@ -22,6 +22,6 @@ struct CutOrigin {
 /// comes from it, else the lowest one that does.
 /// \throw Error that names a node at the position of no old one: the later model isn't cut from the
 /// earlier
-CutOrigin find_cut_origin(const Model& before, const Model& after);
+CutOrigin find_cut_origin(const model::Model& before, const model::Model& after);
 
-} // namespace gewebe
+} // namespace gewebe::cutting

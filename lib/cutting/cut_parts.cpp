@@ -7,16 +7,16 @@
 #include <utility>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::cutting {
 
 namespace {
 
 constexpr std::uint32_t none = CutModel::gone;
 
 /// The set of each node, connected by springs, triangles and tetrahedra; returns how many.
-std::uint32_t connected(const Model& model, std::vector<std::uint32_t>& set) {
+std::uint32_t connected(const model::Model& model, std::vector<std::uint32_t>& set) {
   DisjointSets sets(model.nodes.size());
-  for (const Spring& s : model.springs)
+  for (const model::Spring& s : model.springs)
     sets.join(s.i, s.j);
   for (const Triangle& t : model.triangles) {
     sets.join(t[0], t[1]);
@@ -32,15 +32,16 @@ std::uint32_t connected(const Model& model, std::vector<std::uint32_t>& set) {
 }
 
 /// The nodes with that mark. A central node to which none of them belongs is left out.
-ModelPart part_of(const Model& model, const std::vector<std::uint32_t>& mark, std::uint32_t value) {
-  const std::size_t body = body_count(model);
+ModelPart part_of(const model::Model& model, const std::vector<std::uint32_t>& mark,
+                  std::uint32_t value) {
+  const std::size_t body = model::body_count(model);
   std::vector<bool> named(model.nodes.size());
   for (std::size_t i = 0; i < body; ++i)
     if (mark[i] == value && model.nodes[i].central >= 0)
       named[static_cast<std::size_t>(model.nodes[i].central)] = true;
   std::vector<std::uint32_t> place(model.nodes.size(), none);
   ModelPart part;
-  Model& m = part.model;
+  model::Model& m = part.model;
   m.name = model.name;
   m.materials = model.materials;
   for (std::uint32_t i = 0; i < model.nodes.size(); ++i)
@@ -49,13 +50,13 @@ ModelPart part_of(const Model& model, const std::vector<std::uint32_t>& mark, st
       part.origin.push_back(i);
     }
   for (const std::uint32_t i : part.origin) {
-    Node& node = m.nodes.emplace_back(model.nodes[i]);
+    model::Node& node = m.nodes.emplace_back(model.nodes[i]);
     if (node.central >= 0)
       node.central = static_cast<std::int32_t>(place[static_cast<std::size_t>(node.central)]);
     if (!model.normals.empty())
       m.normals.push_back(model.normals[i]);
   }
-  for (Spring s : model.springs) {
+  for (model::Spring s : model.springs) {
     s.i = place[s.i];
     s.j = place[s.j];
     if (s.i != none && s.j != none)
@@ -89,9 +90,9 @@ ModelPart part_of(const Model& model, const std::vector<std::uint32_t>& mark, st
 
 } // namespace
 
-FreeParts free_parts(const Model& before, const CutModel& cut) {
-  const Model& model = cut.model;
-  const std::size_t body = body_count(model);
+FreeParts free_parts(const model::Model& before, const CutModel& cut) {
+  const model::Model& model = cut.model;
+  const std::size_t body = model::body_count(model);
   std::vector<std::uint32_t> old_set, set;
   const std::uint32_t count = connected(model, set);
   if (count == 1)
@@ -104,7 +105,7 @@ FreeParts free_parts(const Model& before, const CutModel& cut) {
   std::vector<Group> groups(count);
   for (std::uint32_t i = 0; i < model.nodes.size(); ++i) {
     Group& g = groups[set[i]];
-    g.held = g.held || model.nodes[i].fixed != fixed_none;
+    g.held = g.held || model.nodes[i].fixed != model::fixed_none;
     if (i >= body)
       continue;
     g.old = old_set[cut.origin[i]];
@@ -184,4 +185,4 @@ CutModel without_parts(CutModel cut, std::optional<ModelPart> rest) {
   return cut;
 }
 
-} // namespace gewebe
+} // namespace gewebe::cutting

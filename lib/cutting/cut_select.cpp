@@ -12,7 +12,7 @@
 #include <string>
 #include <utility>
 
-namespace gewebe {
+namespace gewebe::cutting {
 
 namespace {
 
@@ -28,10 +28,10 @@ void put_in_order(Cut& cut) {
   tidy(cut.sides);
 }
 
-std::vector<Vec3> positions(const Model& model, std::span<const double> displacement) {
+std::vector<Vec3> positions(const model::Model& model, std::span<const double> displacement) {
   std::vector<Vec3> all;
   all.reserve(model.nodes.size());
-  for (const Node& n : model.nodes)
+  for (const model::Node& n : model.nodes)
     all.push_back(n.position);
   for (std::size_t i = 0; i < displacement.size() / 3; ++i)
     all[i] += {displacement[3 * i], displacement[3 * i + 1], displacement[3 * i + 2]};
@@ -121,7 +121,7 @@ private:
 struct CornersOfNodes {
   std::vector<std::uint32_t> first, corners;
 
-  explicit CornersOfNodes(const Model& model) : first(model.nodes.size() + 1) {
+  explicit CornersOfNodes(const model::Model& model) : first(model.nodes.size() + 1) {
     for (const Triangle& t : model.triangles)
       for (const std::uint32_t node : t)
         ++first[node + std::size_t{1}];
@@ -138,8 +138,8 @@ struct CornersOfNodes {
 };
 
 /// Pairs of nodes opposite to each other across an edge, ascending.
-std::vector<std::array<std::uint32_t, 2>> opposite_pairs(const Model& model,
-                                                         const EdgeTable& edges) {
+std::vector<std::array<std::uint32_t, 2>> opposite_pairs(const model::Model& model,
+                                                         const mesh::EdgeTable& edges) {
   std::vector<std::array<std::uint32_t, 2>> pairs;
   for (std::size_t e = 0; e < edges.size(); ++e)
     if (const auto around = edges.around(e); around.size() == 2) {
@@ -162,7 +162,7 @@ std::vector<std::uint8_t> marked_near(const std::vector<Vec3>& at, const Area& a
 }
 
 /// How far a corner is from its triangle's middle, at most.
-double longest_reach(const Model& model, const std::vector<Vec3>& at,
+double longest_reach(const model::Model& model, const std::vector<Vec3>& at,
                      const std::vector<Vec3>& middle) {
   double square = 0;
   for (std::size_t t = 0; t < middle.size(); ++t)
@@ -173,7 +173,7 @@ double longest_reach(const Model& model, const std::vector<Vec3>& at,
   return std::sqrt(square);
 }
 
-std::vector<Vec3> middles(const Model& model, const std::vector<Vec3>& at) {
+std::vector<Vec3> middles(const model::Model& model, const std::vector<Vec3>& at) {
   std::vector<Vec3> all;
   all.reserve(model.triangles.size());
   for (const Triangle& t : model.triangles)
@@ -184,13 +184,13 @@ std::vector<Vec3> middles(const Model& model, const std::vector<Vec3>& at) {
 template <class Area>
 class AreaCutter {
 public:
-  AreaCutter(const Model& model, const std::vector<Vec3>& at, const Area& area)
+  AreaCutter(const model::Model& model, const std::vector<Vec3>& at, const Area& area)
       : model_(model), at_(at), area_(area), middle_(middles(model, at)) {
     // A triangle reaches so far from the midpoint of its edge. Each round that tidies the rim moves
     // it by a triangle, bending springs reach over two.
     const double reach = longest_reach(model, at, middle_);
     const double far = (2 * max_rounds + 8) * reach;
-    edges_ = surface_part(model, marked_near(at, area, far)).edges;
+    edges_ = model::surface_part(model, marked_near(at, area, far)).edges;
     const double around_edge = Area::bounded ? 2 * reach : far;
     grown_ = {around_edge, around_edge, around_edge};
   }
@@ -267,7 +267,7 @@ private:
     return count == corners.size();
   }
 
-  bool is_near(const Spring& spring) const {
+  bool is_near(const model::Spring& spring) const {
     Vec3 low = at_[spring.i], high = low;
     for (int a = 0; a < 3; ++a) {
       low[a] = std::min(low[a], at_[spring.j][a]);
@@ -281,15 +281,15 @@ private:
     std::vector<std::array<std::uint32_t, 2>> across;
     std::size_t edge = 0;
     for (std::size_t s = 0; s < model_.springs.size(); ++s) {
-      const Spring& spring = model_.springs[s];
+      const model::Spring& spring = model_.springs[s];
       const std::array<std::uint32_t, 2> ends{spring.i, spring.j};
-      if (spring.kind == SpringKind::edge) {
+      if (spring.kind == model::SpringKind::edge) {
         while (edge < edges_.size() && edges_.ends[edge] < ends)
           ++edge;
         if (edge < edges_.size() && edges_.ends[edge] == ends)
           continue;
       }
-      const bool central = spring.kind == SpringKind::central;
+      const bool central = spring.kind == model::SpringKind::central;
       if (!area_.has(spring.i) || !(central || area_.has(spring.j)) || !is_near(spring))
         continue;
       std::vector<Cut::Side> sides;
@@ -297,7 +297,7 @@ private:
           passes(spring.i, spring.j, sides) || (!central && passes(spring.j, spring.i, sides));
       if (!severed && sides.empty())
         continue;
-      if (spring.kind == SpringKind::bend) {
+      if (spring.kind == model::SpringKind::bend) {
         if (across.empty())
           across = opposite_pairs(model_, edges_);
         if (std::binary_search(across.begin(), across.end(), ends))
@@ -310,25 +310,25 @@ private:
     }
   }
 
-  const Model& model_;
+  const model::Model& model_;
   const std::vector<Vec3>& at_;
   const Area& area_;
   std::vector<Vec3> middle_;
-  EdgeTable edges_;
+  mesh::EdgeTable edges_;
   Vec3 grown_;
   CornersOfNodes fans_{model_};
 };
 
 template <class Area>
-Cut area_cut(const Model& model, const std::vector<Vec3>& at, const Area& area) {
+Cut area_cut(const model::Model& model, const std::vector<Vec3>& at, const Area& area) {
   return AreaCutter<Area>(model, at, area).cut();
 }
 
 std::string text(const Vec3& v) {
-  return number_text(v.x) + " " + number_text(v.y) + " " + number_text(v.z);
+  return text::number_text(v.x) + " " + text::number_text(v.y) + " " + text::number_text(v.z);
 }
 
-std::vector<std::uint8_t> flags(const Model& model, std::span<const std::uint32_t> nodes) {
+std::vector<std::uint8_t> flags(const model::Model& model, std::span<const std::uint32_t> nodes) {
   std::vector<std::uint8_t> all(model.nodes.size());
   for (const std::uint32_t node : nodes)
     all[node] = 1;
@@ -337,7 +337,7 @@ std::vector<std::uint8_t> flags(const Model& model, std::span<const std::uint32_
 
 } // namespace
 
-Cut springs_between(const Model& model, std::span<const std::uint32_t> from,
+Cut springs_between(const model::Model& model, std::span<const std::uint32_t> from,
                     std::span<const std::uint32_t> to) {
   const std::vector<std::uint8_t> a = flags(model, from), b = flags(model, to);
   Cut cut;
@@ -351,7 +351,8 @@ Cut springs_between(const Model& model, std::span<const std::uint32_t> from,
   return cut;
 }
 
-Cut plane_cut(const Model& model, const CutPlane& plane, std::span<const std::uint32_t> nodes) {
+Cut plane_cut(const model::Model& model, const CutPlane& plane,
+              std::span<const std::uint32_t> nodes) {
   PlaneArea area{plane.point, plane.normal / norm(plane.normal), {}};
   if (!nodes.empty())
     area.nodes = flags(model, nodes);
@@ -363,7 +364,7 @@ Cut plane_cut(const Model& model, const CutPlane& plane, std::span<const std::ui
   return cut;
 }
 
-Cut swept_cut(const Model& model, std::span<const double> displacement,
+Cut swept_cut(const model::Model& model, std::span<const double> displacement,
               std::span<const SweptQuad> areas) {
   const QuadArea area(areas);
   if (area.empty())
@@ -380,9 +381,9 @@ Cut swept_cut(const Model& model, std::span<const double> displacement,
 namespace {
 
 /// Opens the fan of `node` across the way to `far`. \return whether it can
-bool open_across(const Model& model, const std::vector<Vec3>& at, const EdgeTable& edges,
-                 const CornersOfNodes& fans, std::uint32_t node, std::uint32_t far,
-                 std::vector<std::array<std::uint32_t, 2>>& opened) {
+bool open_across(const model::Model& model, const std::vector<Vec3>& at,
+                 const mesh::EdgeTable& edges, const CornersOfNodes& fans, std::uint32_t node,
+                 std::uint32_t far, std::vector<std::array<std::uint32_t, 2>>& opened) {
   const Vec3 way = at[far] - at[node];
   Vec3 normal;
   for (const std::uint32_t c : fans.of(node)) {
@@ -426,12 +427,12 @@ bool open_across(const Model& model, const std::vector<Vec3>& at, const EdgeTabl
 
 } // namespace
 
-Cut torn_cut(const Model& model, std::span<const double> displacement, double strain) {
+Cut torn_cut(const model::Model& model, std::span<const double> displacement, double strain) {
   const std::vector<Vec3> at = positions(model, displacement);
   std::vector<std::size_t> torn;
   std::vector<double> pull(model.nodes.size());
   for (std::size_t s = 0; s < model.springs.size(); ++s) {
-    const Spring& spring = model.springs[s];
+    const model::Spring& spring = model.springs[s];
     const double length = norm(at[spring.j] - at[spring.i]), more = length - spring.rest;
     if (more > 0) {
       pull[spring.i] += spring.stiffness * more;
@@ -446,12 +447,12 @@ Cut torn_cut(const Model& model, std::span<const double> displacement, double st
   std::vector<std::uint8_t> ends_of_torn(model.nodes.size());
   for (const std::size_t s : torn)
     ends_of_torn[model.springs[s].i] = ends_of_torn[model.springs[s].j] = 1;
-  const EdgeTable edges = surface_part(model, ends_of_torn).edges;
+  const mesh::EdgeTable edges = model::surface_part(model, ends_of_torn).edges;
   const CornersOfNodes fans(model);
   for (const std::size_t s : torn) {
-    const Spring& spring = model.springs[s];
-    const bool beside =
-        spring.kind == SpringKind::edge && edges.find({spring.i, spring.j}) != EdgeTable::no_edge;
+    const model::Spring& spring = model.springs[s];
+    const bool beside = spring.kind == model::SpringKind::edge &&
+                        edges.find({spring.i, spring.j}) != mesh::EdgeTable::no_edge;
     const bool i_first = pull[spring.i] >= pull[spring.j];
     const std::uint32_t first = i_first ? spring.i : spring.j,
                         second = i_first ? spring.j : spring.i;
@@ -463,4 +464,4 @@ Cut torn_cut(const Model& model, std::span<const double> displacement, double st
   return cut;
 }
 
-} // namespace gewebe
+} // namespace gewebe::cutting

@@ -17,11 +17,11 @@
 #include <span>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::cutting {
 
 /// Springs of any kind from a node of `from` to one of `to`; both ascend.
 /// \throw Error if there is none
-Cut springs_between(const Model& model, std::span<const std::uint32_t> from,
+Cut springs_between(const model::Model& model, std::span<const std::uint32_t> from,
                     std::span<const std::uint32_t> to);
 
 struct CutPlane {
@@ -33,18 +33,19 @@ struct CutPlane {
 /// Cut by a plane through the model at rest; with `nodes` (ascending, not empty) only of edges with
 /// both ends among them, and of springs from these to central nodes.
 /// \throw Error if the plane misses the model
-Cut plane_cut(const Model& model, const CutPlane& plane, std::span<const std::uint32_t> nodes);
+Cut plane_cut(const model::Model& model, const CutPlane& plane,
+              std::span<const std::uint32_t> nodes);
 
 /// Corners of an area, in order.
 using SweptQuad = std::array<Vec3, 4>;
 
 /// Cut by areas, with nodes displaced from rest by 3 n numbers (empty: at rest). It may be empty.
-Cut swept_cut(const Model& model, std::span<const double> displacement,
+Cut swept_cut(const model::Model& model, std::span<const double> displacement,
               std::span<const SweptQuad> areas);
 
 /// Tears at springs that are longer than (1 + strain) times their rest length. An edge of the
 /// surface opens the surface across itself, at the end with the larger pull of springs. If that is
 /// impossible the edge is removed; other springs are removed too. It may be empty. \pre strain > 0
-Cut torn_cut(const Model& model, std::span<const double> displacement, double strain);
+Cut torn_cut(const model::Model& model, std::span<const double> displacement, double strain);
 
-} // namespace gewebe
+} // namespace gewebe::cutting

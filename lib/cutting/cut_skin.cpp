@@ -14,7 +14,7 @@
 #include <unordered_set>
 #include <utility>
 
-namespace gewebe {
+namespace gewebe::cutting {
 namespace {
 
 using namespace skins;
@@ -24,7 +24,7 @@ constexpr double apart = 1e-6; // of a cell: walls that lie on each other
 /// Opens the skin along the curve and gives the wound its walls.
 class SkinOpener {
 public:
-  SkinOpener(const Skin& skin, SkinCrossing crossing, double reach)
+  SkinOpener(const model::Skin& skin, SkinCrossing crossing, double reach)
       : skin_(skin), reach_(reach), x_(std::move(crossing)) {}
 
   SkinCut carry_out() {
@@ -217,7 +217,7 @@ private:
   // ---- What it becomes
 
   void write() {
-    Skin& skin = result_.skin;
+    model::Skin& skin = result_.skin;
     const std::size_t before = skin_.points.size();
     skin.points.assign(skin_.points.begin(), skin_.points.end());
     skin.points.insert(skin.points.end(), x_.places.begin() + static_cast<std::ptrdiff_t>(before),
@@ -266,7 +266,7 @@ private:
 
   /// From the walls on over the skin, as far as it is near.
   void tell_sides() {
-    const Skin& skin = result_.skin;
+    const model::Skin& skin = result_.skin;
     std::vector<std::int8_t>& side = result_.side;
     side.assign(skin.points.size(), 0);
     std::vector<std::uint8_t> seen(skin.points.size());
@@ -312,7 +312,7 @@ private:
     }
   }
 
-  const Skin& skin_;
+  const model::Skin& skin_;
   double reach_;
   SkinCrossing x_;
   std::vector<std::uint32_t> inside_; // triangles of the sheet inside
@@ -326,7 +326,7 @@ private:
 
 } // namespace
 
-SkinCut cut_skin(const Skin& skin, const SkinSheet& sheet, double cell, double reach) {
+SkinCut cut_skin(const model::Skin& skin, const SkinSheet& sheet, double cell, double reach) {
   SkinCut result;
   result.skin = skin;
   result.side.assign(skin.points.size(), 0);
@@ -368,4 +368,4 @@ SkinCut cut_skin(const Skin& skin, const SkinSheet& sheet, double cell, double r
   return result;
 }
 
-} // namespace gewebe
+} // namespace gewebe::cutting

@@ -15,10 +15,10 @@
 #include <cstdint>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::cutting {
 
 struct SkinCut {
-  Skin skin; ///< points before keep their numbers
+  model::Skin skin; ///< points before keep their numbers
   /// Of each triangle: the one before in which it lies, or none of a wall.
   std::vector<std::uint32_t> triangle;
   static constexpr std::uint32_t none = UINT32_MAX;
@@ -41,6 +41,6 @@ struct SkinCut {
 /// \throw Error if the skin is not a surface of one inside where the sheet comes;
 /// MeetingOfNoSheets (mesh/crossing.h), of some 5 in 1,000 random ways of a blade through earlier
 /// wounds
-SkinCut cut_skin(const Skin& skin, const SkinSheet& sheet, double cell, double reach);
+SkinCut cut_skin(const model::Skin& skin, const SkinSheet& sheet, double cell, double reach);
 
-} // namespace gewebe
+} // namespace gewebe::cutting

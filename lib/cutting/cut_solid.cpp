@@ -19,18 +19,18 @@
 #include <tuple>
 #include <utility>
 
-namespace gewebe {
+namespace gewebe::cutting {
 namespace {
 
 using Weights = std::array<double, 3>;
 
-void check(const Model& model) {
+void check(const model::Model& model) {
   if (model.tetrahedra.empty())
     throw Error("the model has no tetrahedra, expected a solid to cut with a blade");
   if (!model.springs.empty())
     throw Error("the model has " + std::to_string(model.springs.size()) +
                 " springs, expected elements alone to cut with a blade");
-  if (body_count(model) != model.nodes.size())
+  if (model::body_count(model) != model.nodes.size())
     throw Error("the model has central nodes, expected elements alone to cut with a blade");
 }
 
@@ -89,7 +89,8 @@ struct NamedTriangle {
 class Cutter {
 public:
   /// \param sheet of the skin, if there is one  \param narrow no wider than the wall
-  Cutter(const Model& model, TetCut cut, TetMesh before, const SkinSheet* sheet, bool narrow)
+  Cutter(const model::Model& model, incision::TetCut cut, tetrahedra::TetMesh before,
+         const SkinSheet* sheet, bool narrow)
       : before_(model), mesh_(std::move(before)), cut_(std::move(cut)), sheet_(sheet),
         narrow_(narrow) {
     result_.model = model;
@@ -115,18 +116,18 @@ public:
 
 private:
   void write_elements() {
-    Model& model = result_.model;
+    model::Model& model = result_.model;
     model.tetrahedra = cut_.mesh.tetrahedra;
     model.middles = cut_.mesh.middles;
     model.tetrahedron_material = cut_.mesh.material;
   }
 
   /// Masses by the tetrahedra of a mesh that come from changed ones.
-  std::vector<double> masses_of_changed(const TetMesh& mesh, bool now) const {
+  std::vector<double> masses_of_changed(const tetrahedra::TetMesh& mesh, bool now) const {
     std::vector<bool> changed(before_.tetrahedra.size());
     for (const std::uint32_t t : cut_.changed)
       changed[t] = true;
-    TetMesh part;
+    tetrahedra::TetMesh part;
     part.points = mesh.points;
     for (std::size_t t = 0; t < mesh.tetrahedra.size(); ++t)
       if (changed[now ? cut_.tetrahedron[t] : t]) {
@@ -135,12 +136,12 @@ private:
         if (!mesh.middles.empty())
           part.middles.push_back(mesh.middles[t]);
       }
-    return solid_masses(part, element_materials(before_));
+    return fem::solid_masses(part, fem::element_materials(before_));
   }
 
   /// The nodes before between which a node stands.
-  std::vector<std::uint32_t> parents_of(const TetNodeOrigin& from) const {
-    if (from.node != TetNodeOrigin::none)
+  std::vector<std::uint32_t> parents_of(const incision::TetNodeOrigin& from) const {
+    if (from.node != incision::TetNodeOrigin::none)
       return {from.node};
     std::vector<std::uint32_t> parents;
     for (std::size_t k = 0; k < 4; ++k)
@@ -153,19 +154,19 @@ private:
     std::vector<double> lost = masses_of_changed(mesh_, false);
     const std::vector<double> gained = masses_of_changed(cut_.mesh, true);
     lost.resize(gained.size());
-    std::vector<Node>& nodes = result_.model.nodes;
+    std::vector<model::Node>& nodes = result_.model.nodes;
     nodes.resize(cut_.mesh.points.size());
     for (std::size_t n = 0; n < nodes.size(); ++n) {
-      const TetNodeOrigin& from = cut_.origin[n];
+      const incision::TetNodeOrigin& from = cut_.origin[n];
       const bool had = n < before_.nodes.size();
       nodes[n].position = cut_.mesh.points[n];
       if (!had || lost[n] != gained[n]) { // else as it was, to the last digit
         nodes[n].mass = (had ? before_.nodes[n].mass - lost[n] : 0) + gained[n];
         nodes[n].drag = drag_rate(from) * nodes[n].mass;
       }
-      if (had && from.node != TetNodeOrigin::none)
+      if (had && from.node != incision::TetNodeOrigin::none)
         continue;
-      nodes[n].fixed = fixed_all;
+      nodes[n].fixed = model::fixed_all;
       for (const std::uint32_t parent : parents_of(from))
         nodes[n].fixed = static_cast<std::uint8_t>(nodes[n].fixed & before_.nodes[parent].fixed);
       nodes[n].material = -1;
@@ -173,18 +174,18 @@ private:
     give_materials(nodes);
   }
 
-  double drag_rate(const TetNodeOrigin& from) const {
+  double drag_rate(const incision::TetNodeOrigin& from) const {
     double rate = 0;
     const std::vector<std::uint32_t> parents = parents_of(from);
     for (const std::uint32_t parent : parents) {
-      const Node& node = before_.nodes[parent];
+      const model::Node& node = before_.nodes[parent];
       rate += node.mass > 0 ? node.drag / node.mass / static_cast<double>(parents.size()) : 0;
     }
     return rate;
   }
 
-  void give_materials(std::vector<Node>& nodes) const {
-    const TetMesh& mesh = cut_.mesh;
+  void give_materials(std::vector<model::Node>& nodes) const {
+    const tetrahedra::TetMesh& mesh = cut_.mesh;
     const auto use = [&](std::uint32_t node, std::int32_t material) {
       if (nodes[node].material < 0)
         nodes[node].material = material;
@@ -206,20 +207,20 @@ private:
   std::vector<Triangle> triangles_of(std::uint32_t face) const {
     const Tetrahedron& t = before_.tetrahedra[face / 4];
     Triangle middles{};
-    const auto& own = tetrahedron_faces[face % 4];
+    const auto& own = tetrahedra::tetrahedron_faces[face % 4];
     for (std::size_t c = 0; quadratic() && c < 3; ++c)
       for (std::size_t k = 0; k < 6; ++k) {
-        const auto& [a, b] = tetrahedron_edges[k];
+        const auto& [a, b] = tetrahedra::tetrahedron_edges[k];
         if (std::min(a, b) == std::min(own[c], own[(c + 1) % 3]) &&
             std::max(a, b) == std::max(own[c], own[(c + 1) % 3]))
           middles[c] = before_.middles[face / 4][k];
       }
-    return surface_of(corners_of_face(t, face % 4), middles, quadratic());
+    return surface_of(tetrahedra::corners_of_face(t, face % 4), middles, quadratic());
   }
 
   void index_triangles() {
     std::vector<std::uint8_t> near(before_.nodes.size());
-    for (const CutFace& face : cut_.surface)
+    for (const incision::CutFace& face : cut_.surface)
       for (const Triangle& triangle : triangles_of(face.face_before))
         for (const std::uint32_t corner : triangle)
           near[corner] = 1;
@@ -254,7 +255,7 @@ private:
   void write_surface() {
     index_triangles();
     std::vector<bool> replaced(before_.triangles.size());
-    for (const CutFace& face : cut_.surface)
+    for (const incision::CutFace& face : cut_.surface)
       for (const Triangle& triangle : triangles_of(face.face_before))
         replaced[number_of(triangle, face.face_before)] = true;
     result_.model.triangles.clear();
@@ -262,9 +263,9 @@ private:
     for (std::uint32_t n = 0; n < before_.triangles.size(); ++n)
       if (!replaced[n])
         add(before_.triangles[n], n, texcoords_before(n));
-    for (const CutFace& face : cut_.surface)
+    for (const incision::CutFace& face : cut_.surface)
       add_parts(face);
-    for (const WallTriangle& wall : cut_.wall)
+    for (const incision::WallTriangle& wall : cut_.wall)
       for (std::size_t side = 0; side < 2; ++side)
         for (const Triangle& triangle :
              surface_of(wall.corners[side], wall.middles[side], quadratic()))
@@ -277,7 +278,7 @@ private:
     return before_.texcoords[n];
   }
 
-  void add_parts(const CutFace& face) {
+  void add_parts(const incision::CutFace& face) {
     const std::vector<Triangle> now = surface_of(face.corners, face.middles, quadratic()),
                                 old = triangles_of(face.face_before);
     const std::vector<std::array<Weights, 3>> places = surface_of(face.weights, quadratic());
@@ -309,7 +310,7 @@ private:
   }
 
   void write_normals() {
-    Model& model = result_.model;
+    model::Model& model = result_.model;
     if (before_.normals.empty())
       return;
     std::vector<std::uint8_t> renewed(model.nodes.size());
@@ -344,7 +345,7 @@ private:
     constexpr int steps = 6;
     double longest = 0;
     for (const std::uint32_t t : cut_.changed)
-      for (const auto& [a, b] : tetrahedron_edges)
+      for (const auto& [a, b] : tetrahedra::tetrahedron_edges)
         longest = std::max(longest, norm(mesh_.points[mesh_.tetrahedra[t][b]] -
                                          mesh_.points[mesh_.tetrahedra[t][a]]));
     SkinSheet narrow;
@@ -362,9 +363,9 @@ private:
     result_.skin_end = std::move(cut.end);
   }
 
-  const Model& before_;
-  TetMesh mesh_; // the elements before
-  TetCut cut_;
+  const model::Model& before_;
+  tetrahedra::TetMesh mesh_; // the elements before
+  incision::TetCut cut_;
   const SkinSheet* sheet_;
   bool narrow_;
   std::vector<NamedTriangle> named_; // triangles before near the blade
@@ -373,25 +374,25 @@ private:
 
 } // namespace
 
-double sheet_cell(const Model& model) {
+double sheet_cell(const model::Model& model) {
   double sum = 0;
   for (const Tetrahedron& t : model.tetrahedra)
-    for (const auto& [a, b] : tetrahedron_edges)
+    for (const auto& [a, b] : tetrahedra::tetrahedron_edges)
       sum += norm(model.nodes[t[b]].position - model.nodes[t[a]].position);
   return sum / (6 * static_cast<double>(model.tetrahedra.size()));
 }
 
-SolidCut cut_solid(const Model& model, const TriangleMesh& blade, const BladeCutOptions& options,
-                   const SkinSheet* sheet) {
+SolidCut cut_solid(const model::Model& model, const TriangleMesh& blade,
+                   const incision::BladeCutOptions& options, const SkinSheet* sheet) {
   check(model);
-  BladeCutOptions own = options;
+  incision::BladeCutOptions own = options;
   std::vector<std::uint32_t> held(options.held.begin(), options.held.end());
   for (std::uint32_t n = 0; n < model.nodes.size(); ++n)
-    if (model.nodes[n].fixed != fixed_none)
+    if (model.nodes[n].fixed != model::fixed_none)
       held.push_back(n);
   own.held = held;
-  TetMesh mesh = element_mesh(model);
-  TetCut cut = cut_tetrahedra(mesh, blade, own);
+  tetrahedra::TetMesh mesh = fem::element_mesh(model);
+  incision::TetCut cut = incision::cut_tetrahedra(mesh, blade, own);
   SkinSheet of_blade;
   if (sheet == nullptr && !model.skin.points.empty()) {
     of_blade.surface = blade;
@@ -402,7 +403,7 @@ SolidCut cut_solid(const Model& model, const TriangleMesh& blade, const BladeCut
 
 namespace {
 
-bool before_by_place(const TetNodeOrigin& a, const TetNodeOrigin& b) {
+bool before_by_place(const incision::TetNodeOrigin& a, const incision::TetNodeOrigin& b) {
   return std::tie(a.tetrahedron, a.weights) < std::tie(b.tetrahedron, b.weights);
 }
 
@@ -414,30 +415,30 @@ std::uint32_t main_of(const std::vector<std::pair<std::uint32_t, double>>& share
 
 } // namespace
 
-CutModel as_cut_model(const Model& before, SolidCut cut) {
+CutModel as_cut_model(const model::Model& before, SolidCut cut) {
   const auto n = static_cast<std::uint32_t>(before.nodes.size());
-  const TetMesh mesh = element_mesh(before);
+  const tetrahedra::TetMesh mesh = fem::element_mesh(before);
   CutModel result;
   std::vector<std::uint32_t> moved; // nodes before
   for (std::uint32_t i = 0; i < n; ++i)
-    if (cut.origin[i].node == TetNodeOrigin::none)
+    if (cut.origin[i].node == incision::TetNodeOrigin::none)
       moved.push_back(i);
   std::ranges::sort(moved, [&](std::uint32_t a, std::uint32_t b) {
     return before_by_place(cut.origin[a], cut.origin[b]);
   });
   std::vector<bool> fresh(cut.origin.size());
   for (std::uint32_t i = 0; i < cut.origin.size(); ++i) {
-    const TetNodeOrigin& from = cut.origin[i];
-    if (from.node != TetNodeOrigin::none) {
+    const incision::TetNodeOrigin& from = cut.origin[i];
+    if (from.node != incision::TetNodeOrigin::none) {
       result.origin.push_back(from.node);
       continue;
     }
-    CutModel::Between between{i, shares_of(mesh, from)};
+    CutModel::Between between{i, incision::shares_of(mesh, from)};
     std::uint32_t origin = i;
     if (i >= n) { // a copy of one that has been moved, or new
       const auto at = std::ranges::lower_bound(
           moved, from, before_by_place,
-          [&](std::uint32_t m) -> const TetNodeOrigin& { return cut.origin[m]; });
+          [&](std::uint32_t m) -> const incision::TetNodeOrigin& { return cut.origin[m]; });
       fresh[i] = at == moved.end() || !(cut.origin[*at] == from);
       origin = fresh[i] ? main_of(between.of) : *at;
     }
@@ -462,9 +463,9 @@ CutModel as_cut_model(const Model& before, SolidCut cut) {
   return result;
 }
 
-TriangleMesh plane_blade(const Model& model, const CutPlane& plane) {
+TriangleMesh plane_blade(const model::Model& model, const CutPlane& plane) {
   Box3 box;
-  for (const Node& node : model.nodes)
+  for (const model::Node& node : model.nodes)
     box.add(node.position);
   const Vec3 normal = plane.normal / norm(plane.normal), middle = (box.min + box.max) * 0.5;
   const Vec3 foot = middle - dot(normal, middle - plane.point) * normal;
@@ -478,4 +479,4 @@ TriangleMesh plane_blade(const Model& model, const CutPlane& plane) {
   return blade;
 }
 
-} // namespace gewebe
+} // namespace gewebe::cutting

@@ -10,19 +10,20 @@
 #include <cstdint>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::cutting {
 
 struct SolidCut {
   /// In `triangle`: of the wall.
   static constexpr std::uint32_t wall = UINT32_MAX;
 
-  Model model;
-  std::vector<TetNodeOrigin> origin; ///< of each node; tetrahedra are those of the model before
+  model::Model model;
+  std::vector<incision::TetNodeOrigin>
+      origin; ///< of each node; tetrahedra are those of the model before
   std::vector<std::uint32_t> tetrahedron; ///< of each: that before which it is (a part of)
   std::vector<std::uint32_t> triangle;    ///< of each: that before in which it lies, or wall
   std::vector<std::uint32_t> changed;     ///< tetrahedra before, as in TetCut
   std::vector<Vec3> skin_end;             ///< SkinCut::end
-  BladeCutReport report;
+  incision::BladeCutReport report;
 
   bool cut() const { return !changed.empty(); }
 };
@@ -54,17 +55,17 @@ struct SolidCut {
 /// without a skin
 /// \throw Error as cut_tetrahedra and cut_skin; if the model has no tetrahedra, has springs or
 /// central nodes; if a face of its boundary at the blade is not among its triangles
-SolidCut cut_solid(const Model& model, const TriangleMesh& blade,
-                   const BladeCutOptions& options = {}, const SkinSheet* sheet = nullptr);
+SolidCut cut_solid(const model::Model& model, const TriangleMesh& blade,
+                   const incision::BladeCutOptions& options = {}, const SkinSheet* sheet = nullptr);
 
 /// The cut as one of any model (cutting/cut.h): copies share what their node had by their masses.
 /// \pre `cut` is of this model
-CutModel as_cut_model(const Model& before, SolidCut cut);
+CutModel as_cut_model(const model::Model& before, SolidCut cut);
 
 /// How large the triangles of a sheet should be: mean length of the edges of elements, mm.
-double sheet_cell(const Model& model);
+double sheet_cell(const model::Model& model);
 
 /// Two triangles of the plane that reach beyond the model at rest. \pre the model has nodes
-TriangleMesh plane_blade(const Model& model, const CutPlane& plane);
+TriangleMesh plane_blade(const model::Model& model, const CutPlane& plane);
 
-} // namespace gewebe
+} // namespace gewebe::cutting

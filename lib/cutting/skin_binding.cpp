@@ -11,11 +11,11 @@
 #include <optional>
 #include <utility>
 
-namespace gewebe {
+namespace gewebe::cutting {
 namespace {
 
 /// Elements whose boxes meet one.
-std::vector<std::uint32_t> elements_in(const Model& model, const Box3& box) {
+std::vector<std::uint32_t> elements_in(const model::Model& model, const Box3& box) {
   std::vector<std::uint32_t> found;
   for (std::uint32_t t = 0; t < model.tetrahedra.size(); ++t) {
     Box3 own;
@@ -37,9 +37,9 @@ Box3 wider(const Box3& box, double by) {
 
 /// Of walls: in a surface inside another one its own; else those of the elements that their first
 /// corners follow, but where most of what the curve encloses is of one, all of it is.
-void give_materials(Model& model, const SkinCut& cut) {
+void give_materials(model::Model& model, const SkinCut& cut) {
   constexpr double most = 0.8; // of the area
-  Skin& skin = model.skin;
+  model::Skin& skin = model.skin;
   std::map<std::uint32_t, std::map<std::int32_t, double>> areas; // by region
   for (std::size_t t = 0; t < skin.triangles.size(); ++t) {
     if (cut.triangle[t] != SkinCut::none)
@@ -68,7 +68,8 @@ void give_materials(Model& model, const SkinCut& cut) {
 
 } // namespace
 
-std::vector<std::int8_t> sides_of_elements(const Model& model, std::span<const WallTriangle> wall,
+std::vector<std::int8_t> sides_of_elements(const model::Model& model,
+                                           std::span<const incision::WallTriangle> wall,
                                            double reach, int steps) {
   std::vector<std::int8_t> side(model.tetrahedra.size());
   if (wall.empty())
@@ -76,7 +77,7 @@ std::vector<std::int8_t> sides_of_elements(const Model& model, std::span<const W
   Box3 box;
   std::vector<std::uint8_t> seen(side.size()); // 1 above, 2 below
   std::vector<std::uint32_t> work;
-  for (const WallTriangle& w : wall)
+  for (const incision::WallTriangle& w : wall)
     for (std::size_t s = 0; s < 2; ++s) {
       for (const std::uint32_t corner : w.corners[s])
         box.add(model.nodes[corner].position);
@@ -89,7 +90,7 @@ std::vector<std::int8_t> sides_of_elements(const Model& model, std::span<const W
   std::vector<std::pair<std::array<std::uint32_t, 3>, std::uint32_t>> faces;
   for (const std::uint32_t t : near)
     for (std::uint32_t k = 0; k < 4; ++k) {
-      Triangle face = corners_of_face(model.tetrahedra[t], k);
+      Triangle face = tetrahedra::corners_of_face(model.tetrahedra[t], k);
       std::ranges::sort(face);
       faces.emplace_back(face, t);
     }
@@ -120,17 +121,17 @@ std::vector<std::int8_t> sides_of_elements(const Model& model, std::span<const W
   return side;
 }
 
-SkinSheet sheet_beside(const Model& model, std::span<const WallTriangle> wall,
+SkinSheet sheet_beside(const model::Model& model, std::span<const incision::WallTriangle> wall,
                        const SkinSheet& sheet) {
   SkinSheet beside;
   std::vector<bool> of_wall(model.nodes.size());
-  for (const WallTriangle& w : wall)
+  for (const incision::WallTriangle& w : wall)
     for (const Triangle& corners : w.corners)
       for (const std::uint32_t corner : corners)
         of_wall[corner] = true;
   std::vector<std::uint32_t> every(model.tetrahedra.size());
   std::iota(every.begin(), every.end(), 0U);
-  const elements::ElementBoxes boxes(model, every);
+  const embedding::elements::ElementBoxes boxes(model, every);
   beside.surface.points = sheet.surface.points;
   for (const Triangle& t : sheet.surface.triangles) {
     Vec3 middle;
@@ -144,9 +145,9 @@ SkinSheet sheet_beside(const Model& model, std::span<const WallTriangle> wall,
   return beside;
 }
 
-void bind_skin(Model& model, const SkinCut& cut, std::span<const std::int8_t> elements,
+void bind_skin(model::Model& model, const SkinCut& cut, std::span<const std::int8_t> elements,
                std::span<const std::uint32_t> changed) {
-  Skin& skin = model.skin;
+  model::Skin& skin = model.skin;
   std::vector<std::uint32_t> points;
   Box3 box;
   double longest = 0;
@@ -161,11 +162,11 @@ void bind_skin(Model& model, const SkinCut& cut, std::span<const std::int8_t> el
     return;
   for (std::size_t t = 0; t < elements.size(); ++t)
     if (elements[t] != 0)
-      for (const auto& [a, b] : tetrahedron_edges)
+      for (const auto& [a, b] : tetrahedra::tetrahedron_edges)
         longest = std::max(longest, norm(model.nodes[model.tetrahedra[t][b]].position -
                                          model.nodes[model.tetrahedra[t][a]].position));
   const std::vector<std::uint32_t> near = elements_in(model, wider(box, longest));
-  std::optional<elements::ElementBoxes> boxes, all;
+  std::optional<embedding::elements::ElementBoxes> boxes, all;
   if (!near.empty())
     boxes.emplace(model, near);
   for (const std::uint32_t p : points) {
@@ -186,4 +187,4 @@ void bind_skin(Model& model, const SkinCut& cut, std::span<const std::int8_t> el
   give_materials(model, cut);
 }
 
-} // namespace gewebe
+} // namespace gewebe::cutting

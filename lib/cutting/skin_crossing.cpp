@@ -12,7 +12,7 @@
 #include <map>
 #include <set>
 
-namespace gewebe::skins {
+namespace gewebe::cutting::skins {
 namespace {
 
 constexpr double whole = 0.01; // how far a closed surface's winding number is from an integer
@@ -24,7 +24,7 @@ Key key_of(const Vec3& p) {
 
 class Crosser {
 public:
-  Crosser(const Skin& skin, std::span<const std::uint32_t> shell, std::uint32_t cut,
+  Crosser(const model::Skin& skin, std::span<const std::uint32_t> shell, std::uint32_t cut,
           const RegionSheet& sheet, double gap)
       : skin_(skin), shell_(shell), cut_(cut), sheet_(sheet), gap_(gap),
         materials_(sheet.material) {
@@ -106,12 +106,12 @@ private:
       }
       local.triangles.push_back(corners);
     }
-    x_.crossing = cross_surfaces(local, sheet_.surface);
+    x_.crossing = mesh::cross_surfaces(local, sheet_.surface);
     for (std::size_t p = x_.point.size(); p < x_.crossing.a.points.size(); ++p) {
       x_.point.push_back(static_cast<std::uint32_t>(x_.places.size()));
       x_.places.push_back(x_.crossing.a.points[p]);
     }
-    for (const SurfaceCrossing::Edge& edge : x_.crossing.curve)
+    for (const mesh::SurfaceCrossing::Edge& edge : x_.crossing.curve)
       for (std::size_t k = 0; k < 2; ++k)
         x_.on_skin[directed(edge.b[k], edge.b[1 - k])] = {x_.point[edge.a[k]],
                                                           x_.point[edge.a[1 - k]]};
@@ -287,7 +287,8 @@ private:
     return static_cast<std::uint32_t>(x_.crossing.b.points.size() - 1);
   }
 
-  static void halve(RefinedSurface& of, std::uint32_t t, const Edge& edge, std::uint32_t middle) {
+  static void halve(mesh::RefinedSurface& of, std::uint32_t t, const Edge& edge,
+                    std::uint32_t middle) {
     Triangle one = of.triangles[t], other = one;
     std::ranges::replace(one, edge.p, middle);
     std::ranges::replace(other, edge.q, middle);
@@ -357,7 +358,7 @@ private:
 
   /// A triangle with fronts all round.
   void fan_out(std::uint32_t t) {
-    RefinedSurface& sheet = x_.crossing.b;
+    mesh::RefinedSurface& sheet = x_.crossing.b;
     const auto [a, b, c] = sheet.triangles[t];
     const std::uint32_t middle =
         add_sheet_point((sheet.points[a] + sheet.points[b] + sheet.points[c]) / 3);
@@ -369,7 +370,7 @@ private:
     }
   }
 
-  const Skin& skin_;
+  const model::Skin& skin_;
   std::span<const std::uint32_t> shell_;
   std::uint32_t cut_;
   const RegionSheet& sheet_;
@@ -382,7 +383,7 @@ private:
 
 } // namespace
 
-std::vector<std::uint32_t> shells_of(const Skin& skin) {
+std::vector<std::uint32_t> shells_of(const model::Skin& skin) {
   DisjointSets sets(skin.points.size());
   for (const auto& [a, b, c] : skin.triangles) {
     sets.join(a, b);
@@ -430,9 +431,9 @@ bool SkinCrossing::cut() const {
   return std::ranges::find(inside, true) != inside.end();
 }
 
-SkinCrossing cross_skin(const Skin& skin, std::span<const std::uint32_t> shell, std::uint32_t cut,
-                        const RegionSheet& sheet, double gap) {
+SkinCrossing cross_skin(const model::Skin& skin, std::span<const std::uint32_t> shell,
+                        std::uint32_t cut, const RegionSheet& sheet, double gap) {
   return Crosser(skin, shell, cut, sheet, gap).carry_out();
 }
 
-} // namespace gewebe::skins
+} // namespace gewebe::cutting::skins

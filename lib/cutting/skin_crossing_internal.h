@@ -12,7 +12,7 @@
 #include <utility>
 #include <vector>
 
-namespace gewebe::skins {
+namespace gewebe::cutting::skins {
 
 inline constexpr std::uint32_t none = UINT32_MAX;
 
@@ -41,13 +41,13 @@ struct RegionSheet {
 
 /// What hangs together as skin, by how many surfaces lie round it, which is the shell of each
 /// triangle: 1, or more where tissue lies in tissue. A cavity is of the shell that it is in.
-std::vector<std::uint32_t> shells_of(const Skin& skin);
+std::vector<std::uint32_t> shells_of(const model::Skin& skin);
 
 struct SkinCrossing {
   std::vector<std::uint32_t> local; ///< triangles of the skin that may meet the sheet
   std::vector<std::uint32_t> point; ///< of crossing.a: of places
   std::vector<Vec3> places;         ///< of the skin's points, some held apart, and of new ones
-  SurfaceCrossing crossing;         ///< of `local` with the sheet
+  mesh::SurfaceCrossing crossing;   ///< of `local` with the sheet
   /// Of the sheet's edges on the curve, in both directions: the skin's, in `places`.
   std::unordered_map<std::uint64_t, std::pair<std::uint32_t, std::uint32_t>> on_skin;
   std::vector<bool> inside;          ///< of triangles of the sheet
@@ -61,7 +61,7 @@ struct SkinCrossing {
 /// front, where the sheet ends inside, but those of the front.
 /// \param gap between walls that lie on each other
 /// \throw Error as cut_skin
-SkinCrossing cross_skin(const Skin& skin, std::span<const std::uint32_t> shell, std::uint32_t cut,
-                        const RegionSheet& sheet, double gap);
+SkinCrossing cross_skin(const model::Skin& skin, std::span<const std::uint32_t> shell,
+                        std::uint32_t cut, const RegionSheet& sheet, double gap);
 
-} // namespace gewebe::skins
+} // namespace gewebe::cutting::skins

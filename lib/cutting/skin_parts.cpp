@@ -14,7 +14,7 @@
 #include <utility>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::cutting {
 namespace {
 
 using skins::directed;
@@ -24,7 +24,7 @@ constexpr std::size_t lost = 100; // of so many points one may follow another pa
 
 class Parter {
 public:
-  Parter(const Model& model, FreeParts& parts) : model_(model), skin_(model.skin) {
+  Parter(const model::Model& model, FreeParts& parts) : model_(model), skin_(model.skin) {
     all_.push_back(&*parts.rest);
     for (ModelPart& part : parts.parts)
       all_.push_back(&part);
@@ -234,7 +234,7 @@ private:
   }
 
   void write(std::uint32_t part) {
-    Skin& skin = all_[part]->model.skin;
+    model::Skin& skin = all_[part]->model.skin;
     std::vector<std::uint32_t> number(skin_.points.size(), none);
     for (std::uint32_t t = 0; t < skin_.triangles.size(); ++t) {
       if (of_triangle_[t] != part)
@@ -262,21 +262,21 @@ private:
     }
   }
 
-  const Model& model_;
-  Skin skin_;
+  const model::Model& model_;
+  model::Skin skin_;
   std::vector<ModelPart*> all_;
   std::vector<std::uint32_t> part_, number_; // of each element: its part, its number there
   std::vector<std::uint32_t> of_triangle_;   // the part of each
-  std::optional<elements::ElementBoxes> boxes_;
+  std::optional<embedding::elements::ElementBoxes> boxes_;
   SkinPartsReport report_;
 };
 
 } // namespace
 
-SkinPartsReport part_skin(const Model& model, FreeParts& parts) {
+SkinPartsReport part_skin(const model::Model& model, FreeParts& parts) {
   if (model.skin.points.empty() || !parts.rest)
     return {};
   return Parter(model, parts).carry_out();
 }
 
-} // namespace gewebe
+} // namespace gewebe::cutting

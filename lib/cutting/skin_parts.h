@@ -6,7 +6,7 @@
 
 #include <cstdint>
 
-namespace gewebe {
+namespace gewebe::cutting {
 
 struct SkinPartsReport {
   std::uint64_t torn = 0;  ///< edges that were not cut, between triangles of different parts
@@ -19,6 +19,6 @@ struct SkinPartsReport {
 /// alike, by triangles about their middles. Where at most a hundredth of the points follow elements
 /// of another part, these points count as lost, and nothing is torn.
 /// \pre the parts are of this model; its skin is closed where it is torn
-SkinPartsReport part_skin(const Model& model, FreeParts& parts);
+SkinPartsReport part_skin(const model::Model& model, FreeParts& parts);
 
-} // namespace gewebe
+} // namespace gewebe::cutting

@@ -8,9 +8,9 @@
 #include <cstddef>
 #include <utility>
 
-namespace gewebe {
+namespace gewebe::cutting {
 
-SkinSheet plane_sheet(const Skin& skin, const CutPlane& plane, double cell, double shift) {
+SkinSheet plane_sheet(const model::Skin& skin, const CutPlane& plane, double cell, double shift) {
   constexpr double most = 1000;  // cells along a side
   constexpr double there = 1e-6; // of a cell: on the plane
   constexpr double beside = 1e-6;
@@ -107,4 +107,4 @@ SkinSheet strip_sheet(std::span<const std::vector<Vec3>> rows) {
   return sheet;
 }
 
-} // namespace gewebe
+} // namespace gewebe::cutting

@@ -9,7 +9,7 @@
 #include <span>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::cutting {
 
 /// What a blade has swept, at rest. Above it is where its triangles appear counter-clockwise.
 struct SkinSheet {
@@ -22,11 +22,12 @@ struct SkinSheet {
 /// A grid in the plane, as wide as the skin is there. Above it is where the normal points. \param
 /// shift of a cell, by which its lines are moved, and a millionth of it along the normal: where the
 /// lines pass the skin's own edges or points within rounding, no curve is common to both surfaces
-SkinSheet plane_sheet(const Skin& skin, const CutPlane& plane, double cell, double shift = 0);
+SkinSheet plane_sheet(const model::Skin& skin, const CutPlane& plane, double cell,
+                      double shift = 0);
 
 /// Between rows of points, one after the other, which need not have as many: what lies between two
 /// is as far along one as along the other. Above it is where a row of points to the right that
 /// moves upwards is counter-clockwise: the first, its next, the following row.
 SkinSheet strip_sheet(std::span<const std::vector<Vec3>> rows);
 
-} // namespace gewebe
+} // namespace gewebe::cutting

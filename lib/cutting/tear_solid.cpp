@@ -16,15 +16,15 @@
 #include <tuple>
 #include <utility>
 
-namespace gewebe {
+namespace gewebe::cutting {
 namespace {
 
-SymmetricBlock in_the_middle(const CornerTensors& tensors) {
-  return tensor_at(tensors, {0.25, 0.25, 0.25, 0.25});
+linalg::SymmetricBlock in_the_middle(const fem::CornerTensors& tensors) {
+  return fem::tensor_at(tensors, {0.25, 0.25, 0.25, 0.25});
 }
 
 /// The largest principal value and its direction.
-std::pair<double, Vec3> largest_principal(const SymmetricBlock& s) {
+std::pair<double, Vec3> largest_principal(const linalg::SymmetricBlock& s) {
   Eigen::Matrix3d m;
   m << s[0], s[1], s[2], s[1], s[3], s[4], s[2], s[4], s[5];
   const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver(m);
@@ -68,8 +68,9 @@ private:
 
 class Finder {
 public:
-  Finder(const Model& model, std::span<const double> u, StrainFrames frames, const TearLimit& limit)
-      : model_(model), u_(u), frames_(frames), limit_(limit), mesh_(element_mesh(model)) {
+  Finder(const model::Model& model, std::span<const double> u, fem::StrainFrames frames,
+         const TearLimit& limit)
+      : model_(model), u_(u), frames_(frames), limit_(limit), mesh_(fem::element_mesh(model)) {
     for (const Tetrahedron& t : mesh_.tetrahedra)
       middles_.push_back(
           (mesh_.points[t[0]] + mesh_.points[t[1]] + mesh_.points[t[2]] + mesh_.points[t[3]]) / 4);
@@ -93,15 +94,15 @@ public:
 
 private:
   void find_shares() {
-    const std::vector<SolidMaterial> materials = element_materials(model_);
-    const std::vector<SolidElement> elements = solid_elements(mesh_, materials);
+    const std::vector<fem::SolidMaterial> materials = fem::element_materials(model_);
+    const std::vector<fem::SolidElement> elements = fem::solid_elements(mesh_, materials);
     // In the middle of an element bubbles add nothing, so that its weight says nothing there.
-    const std::vector<CornerTensors> strains =
-        solid_strains(mesh_, materials, elements, u_, {}, frames_);
-    const std::vector<CornerTensors> all =
-        limit_.stress ? solid_stresses(elements, strains) : std::vector<CornerTensors>{};
-    std::vector<SymmetricBlock> tensors;
-    for (const CornerTensors& corners : limit_.stress ? all : strains)
+    const std::vector<fem::CornerTensors> strains =
+        fem::solid_strains(mesh_, materials, elements, u_, {}, frames_);
+    const std::vector<fem::CornerTensors> all =
+        limit_.stress ? fem::solid_stresses(elements, strains) : std::vector<fem::CornerTensors>{};
+    std::vector<linalg::SymmetricBlock> tensors;
+    for (const fem::CornerTensors& corners : limit_.stress ? all : strains)
       tensors.push_back(in_the_middle(corners));
     if (limit_.over > 0)
       tensors = means(tensors, elements);
@@ -116,10 +117,10 @@ private:
     }
   }
 
-  std::vector<SymmetricBlock> means(const std::vector<SymmetricBlock>& tensors,
-                                    std::span<const SolidElement> elements) const {
+  std::vector<linalg::SymmetricBlock> means(const std::vector<linalg::SymmetricBlock>& tensors,
+                                            std::span<const fem::SolidElement> elements) const {
     const MiddleGrid grid(middles_, limit_.over);
-    std::vector<SymmetricBlock> result(tensors.size());
+    std::vector<linalg::SymmetricBlock> result(tensors.size());
     for (std::uint32_t t = 0; t < tensors.size(); ++t) {
       double volume = 0;
       grid.near(middles_[t], [&](std::uint32_t other) {
@@ -137,7 +138,7 @@ private:
 
   /// Planes are carried along by the element's gradient: of its corners, which is near enough.
   Vec3 at_rest(std::uint32_t t, const Vec3& normal) const {
-    if (frames_ == StrainFrames::resting)
+    if (frames_ == fem::StrainFrames::resting)
       return normal;
     const Tetrahedron& c = mesh_.tetrahedra[t];
     std::array<Vec3, 3> rest, now;
@@ -235,11 +236,11 @@ private:
     return nodes;
   }
 
-  const Model& model_;
+  const model::Model& model_;
   std::span<const double> u_;
-  StrainFrames frames_;
+  fem::StrainFrames frames_;
   const TearLimit& limit_;
-  TetMesh mesh_;
+  tetrahedra::TetMesh mesh_;
   std::vector<Vec3> middles_, normal_; // of elements; normals in frames_
   std::vector<double> share_;          // of their limits
 };
@@ -254,9 +255,9 @@ double TearLimit::of(std::int32_t material) const {
   return most.size() == 1 ? most[0] : most[static_cast<std::size_t>(material)];
 }
 
-std::optional<SolidTear> find_tear(const Model& model, std::span<const double> u,
-                                   StrainFrames frames, const TearLimit& limit, int attempt) {
+std::optional<SolidTear> find_tear(const model::Model& model, std::span<const double> u,
+                                   fem::StrainFrames frames, const TearLimit& limit, int attempt) {
   return Finder(model, u, frames, limit).find(attempt);
 }
 
-} // namespace gewebe
+} // namespace gewebe::cutting

@@ -17,7 +17,7 @@
 #include <span>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::cutting {
 
 /// What a solid bears before it tears.
 struct TearLimit {
@@ -56,7 +56,8 @@ inline constexpr std::size_t tear_most_elements = 128;
 /// or local ones of large rotations \pre check_model(model) passes, it has tetrahedra; limit.any();
 /// its sizes are those of the model \throw Error naming the first element whose stress or strain is
 /// not finite
-std::optional<SolidTear> find_tear(const Model& model, std::span<const double> u,
-                                   StrainFrames frames, const TearLimit& limit, int attempt = 0);
+std::optional<SolidTear> find_tear(const model::Model& model, std::span<const double> u,
+                                   fem::StrainFrames frames, const TearLimit& limit,
+                                   int attempt = 0);
 
-} // namespace gewebe
+} // namespace gewebe::cutting

@@ -13,17 +13,17 @@
 
 // Based on: G. Wyvill, C. McPheeters, B. Wyvill, Data structure for soft objects, 1986.
 
-namespace gewebe {
+namespace gewebe::density {
 namespace {
 
 /// The voxel centres inside the supports' box and `clip`; false if there are none.
 bool index_box(const Particles& particles, const DensityOptions& options, IndexBox& box) {
-  if (!index_range(options.info.transform, support_box(particles), box.min, box.max))
+  if (!volume::index_range(options.info.transform, support_box(particles), box.min, box.max))
     return false;
   if (!options.clip)
     return true;
   IndexBox clip{};
-  if (!index_range(options.info.transform, *options.clip, clip.min, clip.max))
+  if (!volume::index_range(options.info.transform, *options.clip, clip.min, clip.max))
     return false;
   for (std::size_t axis = 0; axis < 3; ++axis) {
     box.min[axis] = std::max(box.min[axis], clip.min[axis]);
@@ -44,7 +44,7 @@ double min_leaves(std::span<const IndexParticle> particles, const IndexBox& clip
       voxels *=
           std::max(0.0, std::min(center[axis] + half, static_cast<double>(clip.max[axis])) -
                             std::max(center[axis] - half, static_cast<double>(clip.min[axis])));
-    max = std::max(max, voxels / leaf_voxels);
+    max = std::max(max, voxels / volume::leaf_voxels);
   }
   return max;
 }
@@ -54,10 +54,10 @@ double min_leaves(std::span<const IndexParticle> particles, const IndexBox& clip
 double expected_pairs(std::span<const IndexParticle> particles) {
   double sum = 0;
   for (const IndexParticle& p : particles) {
-    const double r = p.radius, edge = leaf_dim - 1, pi = std::numbers::pi;
+    const double r = p.radius, edge = volume::leaf_dim - 1, pi = std::numbers::pi;
     sum += (edge * edge * edge + 6 * edge * edge * r + 3 * pi * edge * r * r +
             4 * pi / 3 * r * r * r) /
-           leaf_voxels;
+           volume::leaf_voxels;
   }
   return sum;
 }
@@ -83,17 +83,17 @@ double tree_bytes(const std::vector<LeafLists>& plans) {
   return bytes;
 }
 
-Grid plain_grid(const Context& context, std::span<const IndexParticle> particles,
-                const Blocks& blocks, const std::vector<LeafLists>& plans, const IndexBox& clip,
-                const GridInfo& info, DensityReport& report) {
-  GridBuilder builder(info);
+volume::Grid plain_grid(const Context& context, std::span<const IndexParticle> particles,
+                        const Blocks& blocks, const std::vector<LeafLists>& plans,
+                        const IndexBox& clip, const volume::GridInfo& info, DensityReport& report) {
+  volume::GridBuilder builder(info);
   std::size_t leaves = 0;
   for (const LeafLists& plan : plans)
     leaves += plan.leaves.size();
   std::vector<std::uint8_t> filled(leaves);
   const EvaluatedLeaves evaluated = evaluate_plans(
       context, builder, particles, blocks, plans, clip,
-      [&](std::size_t leaf, const LeafRef& ref) { filled[leaf] = activate(ref) ? 1 : 0; });
+      [&](std::size_t leaf, const volume::LeafRef& ref) { filled[leaf] = activate(ref) ? 1 : 0; });
   for (const std::uint8_t one : filled)
     report.leaves += one;
   report.leaf_particle_pairs += evaluated.pairs;
@@ -103,14 +103,14 @@ Grid plain_grid(const Context& context, std::span<const IndexParticle> particles
 
 } // namespace
 
-Grid metaball_density(const Context& context, const Particles& particles,
-                      const DensityOptions& options, DensityReport* report) {
-  const GridTransform& transform = options.info.transform;
+volume::Grid metaball_density(const Context& context, const Particles& particles,
+                              const DensityOptions& options, DensityReport* report) {
+  const volume::GridTransform& transform = options.info.transform;
   if (!transform.is_cubic())
     throw Error("the lattice has " + transform.describe() + ", expected cubic voxels");
   if (particles.size() > UINT32_MAX)
     throw Error("more than 4294967295 particles");
-  GridInfo info = options.info;
+  volume::GridInfo info = options.info;
   if (options.band) {
     if (!(std::fabs(*options.band) <= 1e30)) {
       std::array<char, 32> text{};
@@ -127,14 +127,14 @@ Grid metaball_density(const Context& context, const Particles& particles,
     local = to_index_space(context, particles, transform, clip);
   DensityReport counts;
   counts.particles_out_of_reach = particles.size() - local.size();
-  counts.predicted_evaluations = expected_pairs(local) * leaf_voxels;
+  counts.predicted_evaluations = expected_pairs(local) * volume::leaf_voxels;
   if (!options.band)
     require_memory(context, min_leaves(local, clip) * leaf_bytes, "the volume, at the least,");
 
   // Bounds over leaves of particles below two leaves spare less than they cost. They need the voxel
   // beside each face too.
   const bool bounding = options.band && std::ranges::any_of(local, [](const IndexParticle& p) {
-                          return p.radius > 2 * leaf_dim;
+                          return p.radius > 2 * volume::leaf_dim;
                         });
   const Blocks blocks = sort_into_blocks(context, local, clip, bounding ? 1 : 0);
   const std::vector<LeafLists> plans =
@@ -144,18 +144,18 @@ Grid metaball_density(const Context& context, const Particles& particles,
     planned += static_cast<double>(plan.leaves.size());
     counts.leaves_skipped += plan.skipped;
   }
-  counts.predicted_voxels = planned * leaf_voxels;
+  counts.predicted_voxels = planned * volume::leaf_voxels;
   counts.predicted_bytes = tree_bytes(plans);
   require_memory(context, counts.predicted_bytes, "the volume");
   if (options.planned)
     options.planned(counts);
 
-  Grid grid = options.band ? band_grid(context, local, blocks, plans, clip, info, counts)
-                           : plain_grid(context, local, blocks, plans, clip, info, counts);
-  counts.voxel_evaluations = counts.leaf_particle_pairs * leaf_voxels;
+  volume::Grid grid = options.band ? band_grid(context, local, blocks, plans, clip, info, counts)
+                                   : plain_grid(context, local, blocks, plans, clip, info, counts);
+  counts.voxel_evaluations = counts.leaf_particle_pairs * volume::leaf_voxels;
   if (report != nullptr)
     *report = counts;
   return grid;
 }
 
-} // namespace gewebe
+} // namespace gewebe::density

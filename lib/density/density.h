@@ -14,7 +14,7 @@
 #include <functional>
 #include <optional>
 
-namespace gewebe {
+namespace gewebe::density {
 
 struct DensityReport {
   // Known before the work.
@@ -31,7 +31,7 @@ struct DensityReport {
 };
 
 struct DensityOptions {
-  GridInfo info;              ///< lattice and metadata of the result; the transform must be cubic
+  volume::GridInfo info;      ///< lattice and metadata of the result; the transform must be cubic
   std::optional<Box3> clip;   ///< voxel centres outside this world box stay background
   std::optional<double> band; ///< an isovalue: keep only what its isosurface needs
   std::function<void(const DensityReport&)> planned; ///< gets what is known before the work
@@ -53,7 +53,7 @@ struct DensityOptions {
 ///
 /// \throw Error if the lattice is not cubic, an index leaves ±2^30, a band's isovalue exceeds 1e30,
 /// or memory does not suffice
-Grid metaball_density(const Context& context, const Particles& particles,
-                      const DensityOptions& options, DensityReport* report = nullptr);
+volume::Grid metaball_density(const Context& context, const Particles& particles,
+                              const DensityOptions& options, DensityReport* report = nullptr);
 
-} // namespace gewebe
+} // namespace gewebe::density

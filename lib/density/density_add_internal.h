@@ -8,7 +8,7 @@
 
 #include <immintrin.h>
 
-namespace gewebe {
+namespace gewebe::density {
 namespace {
 
 inline constexpr std::size_t chunk = 32; ///< particles whose rows fit in the first-level cache
@@ -91,4 +91,4 @@ void add_density(const LeafParticle* particles, std::size_t count, float* values
 }
 
 } // namespace
-} // namespace gewebe
+} // namespace gewebe::density

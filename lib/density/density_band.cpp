@@ -7,7 +7,7 @@
 #include <cmath>
 #include <cstring>
 
-namespace gewebe {
+namespace gewebe::density {
 namespace {
 
 constexpr std::size_t batch_leaves = 1024; // a thread's, whose values wait for their place: 2 MiB
@@ -55,20 +55,20 @@ Sides sides_of(const float* values, float bound, bool background_above) {
 
 Int3 neighbour(const Int3& origin, unsigned face) {
   Int3 other = origin;
-  other[face / 2] += (face & 1) != 0 ? leaf_dim : -leaf_dim;
+  other[face / 2] += (face & 1) != 0 ? volume::leaf_dim : -volume::leaf_dim;
   return other;
 }
 
 /// Puts evaluated leaves into the grid. `slots` are the places of each leaf in `values`.
-void store(const Context& context, GridBuilder& builder, std::span<const Int3> origins,
+void store(const Context& context, volume::GridBuilder& builder, std::span<const Int3> origins,
            std::span<const std::size_t> slots, const std::vector<float>& values) {
-  const std::vector<LeafRef> refs = builder.add_leaves(context, origins);
+  const std::vector<volume::LeafRef> refs = builder.add_leaves(context, origins);
   Context quiet = context;
   quiet.progress = nullptr;
   parallel_blocks(quiet, refs.size(), 256, [&](std::size_t begin, std::size_t end) {
     for (std::size_t n = begin; n < end; ++n) {
-      std::memcpy(refs[n].values, values.data() + slots[n] * leaf_voxels,
-                  leaf_voxels * sizeof(float));
+      std::memcpy(refs[n].values, values.data() + slots[n] * volume::leaf_voxels,
+                  volume::leaf_voxels * sizeof(float));
       (void)activate(refs[n]);
     }
   });
@@ -119,7 +119,7 @@ private:
   std::array<bool, 32> used_{};
 };
 
-void add_tiles(GridBuilder& builder, const ConstantCube& cube, float value) {
+void add_tiles(volume::GridBuilder& builder, const ConstantCube& cube, float value) {
   const std::int32_t step = cube.dim >= 4096 ? 4096 : cube.dim >= 128 ? 128 : 8;
   for (std::int32_t i = 0; i < cube.dim; i += step)
     for (std::int32_t j = 0; j < cube.dim; j += step)
@@ -150,7 +150,7 @@ std::vector<std::size_t> leaf_numbers(const std::vector<LeafLists>& plans) {
 class BlockNumbers {
 public:
   BlockNumbers(std::int32_t block_size, std::size_t first, const LeafLists& plan)
-      : mask_(-block_size), edge_(block_size / leaf_dim) {
+      : mask_(-block_size), edge_(block_size / volume::leaf_dim) {
     if (plan.leaves.empty() || edge_ > 16)
       return; // a hash costs less than so large a table
     numbers_.assign(static_cast<std::size_t>(edge_ * edge_ * edge_), IndexMap::none);
@@ -166,8 +166,9 @@ private:
     return {leaf[0] & mask_, leaf[1] & mask_, leaf[2] & mask_};
   }
   std::size_t slot(const Int3& leaf) const {
-    const std::int32_t i = (leaf[0] & ~mask_) / leaf_dim, j = (leaf[1] & ~mask_) / leaf_dim,
-                       k = (leaf[2] & ~mask_) / leaf_dim;
+    const std::int32_t i = (leaf[0] & ~mask_) / volume::leaf_dim,
+                       j = (leaf[1] & ~mask_) / volume::leaf_dim,
+                       k = (leaf[2] & ~mask_) / volume::leaf_dim;
     return static_cast<std::size_t>((i * edge_ + j) * edge_ + k);
   }
   std::int32_t mask_, edge_;
@@ -216,27 +217,28 @@ std::vector<Fate> find_fates(const Context& quiet, std::int32_t block_size,
 
 /// Where bounds spare little, most leaves are stored anyway: all are evaluated in their place, and
 /// those that no edge crosses are taken out again.
-void evaluate_in_place(const Context& context, GridBuilder& builder,
+void evaluate_in_place(const Context& context, volume::GridBuilder& builder,
                        std::span<const IndexParticle> particles, const Blocks& blocks,
                        const std::vector<LeafLists>& plans, const IndexBox& clip, double isovalue,
                        DensityReport& report) {
   const float bound = float_bound(isovalue);
   const std::vector<std::size_t> first = leaf_numbers(plans);
   std::vector<Sides> sides(first.back());
-  const EvaluatedLeaves evaluated = evaluate_plans(
-      context, builder, particles, blocks, plans, clip, [&](std::size_t leaf, const LeafRef& ref) {
-        sides[leaf] = sides_of(ref.values, bound, isovalue < 0);
-        (void)activate(ref);
-      });
+  const EvaluatedLeaves evaluated =
+      evaluate_plans(context, builder, particles, blocks, plans, clip,
+                     [&](std::size_t leaf, const volume::LeafRef& ref) {
+                       sides[leaf] = sides_of(ref.values, bound, isovalue < 0);
+                       (void)activate(ref);
+                     });
   Context quiet = context;
   quiet.progress = nullptr;
   const std::vector<Fate> fates = find_fates(quiet, blocks.size, plans, first, sides);
   const float value = opposite_value(isovalue);
   for (std::size_t n = 0; n < fates.size(); ++n) {
     if (fates[n] == Fate::opposite)
-      builder.replace_leaf({evaluated.leaves[n].origin, leaf_dim, value, true});
+      builder.replace_leaf({evaluated.leaves[n].origin, volume::leaf_dim, value, true});
     else if (fates[n] == Fate::background)
-      builder.replace_leaf({evaluated.leaves[n].origin, leaf_dim, 0, false});
+      builder.replace_leaf({evaluated.leaves[n].origin, volume::leaf_dim, 0, false});
     else
       ++report.leaves;
   }
@@ -258,7 +260,7 @@ std::vector<std::vector<std::uint32_t>> crossed_leaves(const std::vector<LeafLis
 
 /// Where bounds spare most, values wait outside the grid until it is known that they are needed;
 /// leaves on one side that are needed for a neighbour are evaluated again.
-void evaluate_in_batches(const Context& context, GridBuilder& builder,
+void evaluate_in_batches(const Context& context, volume::GridBuilder& builder,
                          std::span<const IndexParticle> particles, const Blocks& blocks,
                          const std::vector<LeafLists>& plans, const IndexBox& clip, double isovalue,
                          DensityReport& report) {
@@ -281,7 +283,7 @@ void evaluate_in_batches(const Context& context, GridBuilder& builder,
     std::vector<std::size_t> slot{0}; // of the first leaf of block begin + n
     for (std::size_t n = begin; n < end; ++n)
       slot.push_back(slot.back() + (wanted.empty() ? plans[n].leaves.size() : wanted[n].size()));
-    values.resize(std::max(values.size(), slot.back() * leaf_voxels));
+    values.resize(std::max(values.size(), slot.back() * volume::leaf_voxels));
     parallel_blocks(quiet, end - begin, 1, [&](std::size_t low, std::size_t high) {
       const BlockTrees::Lent lent = trees.lend();
       BlockTree& tree = *lent.tree;
@@ -294,8 +296,8 @@ void evaluate_in_batches(const Context& context, GridBuilder& builder,
         tree.load(particles, blocks, n);
         const auto work = [&](std::size_t leaf, std::size_t place,
                               std::span<const std::uint32_t> list) {
-          float* const here = values.data() + place * leaf_voxels;
-          std::fill_n(here, leaf_voxels, 0.0F);
+          float* const here = values.data() + place * volume::leaf_voxels;
+          std::fill_n(here, volume::leaf_voxels, 0.0F);
           evaluate_leaf(kernels, clip, tree.particles(), list, plan.leaves[leaf], scratch, here);
           sides[first[n] + leaf] = sides_of(here, bound, isovalue < 0);
           pairs[n] += list.size();
@@ -350,18 +352,18 @@ void evaluate_in_batches(const Context& context, GridBuilder& builder,
   for (std::size_t n = 0; n < plans.size(); ++n)
     for (std::size_t m = 0; m < plans[n].leaves.size(); ++m)
       if (fates[first[n] + m] == Fate::opposite)
-        builder.add_tile({plans[n].leaves[m], leaf_dim, value, true});
+        builder.add_tile({plans[n].leaves[m], volume::leaf_dim, value, true});
   for (const std::uint64_t count : pairs)
     report.leaf_particle_pairs += count;
 }
 
 } // namespace
 
-Grid band_grid(const Context& context, std::span<const IndexParticle> particles,
-               const Blocks& blocks, const std::vector<LeafLists>& plans, const IndexBox& clip,
-               const GridInfo& info, DensityReport& report) {
+volume::Grid band_grid(const Context& context, std::span<const IndexParticle> particles,
+                       const Blocks& blocks, const std::vector<LeafLists>& plans,
+                       const IndexBox& clip, const volume::GridInfo& info, DensityReport& report) {
   const double isovalue = *info.band_isovalue;
-  GridBuilder builder(info);
+  volume::GridBuilder builder(info);
   std::uint64_t planned = 0, skipped = 0;
   for (const LeafLists& plan : plans) {
     planned += plan.leaves.size();
@@ -376,4 +378,4 @@ Grid band_grid(const Context& context, std::span<const IndexParticle> particles,
   return builder.finish();
 }
 
-} // namespace gewebe
+} // namespace gewebe::density

@@ -9,7 +9,7 @@
 #include <cmath>
 #include <emmintrin.h>
 
-namespace gewebe {
+namespace gewebe::density {
 namespace {
 
 constexpr std::uint64_t max_blocks = 8192;
@@ -105,7 +105,8 @@ DensityKernels density_kernels(CpuLevel level) {
 }
 
 std::vector<IndexParticle> to_index_space(const Context& context, const Particles& particles,
-                                          const GridTransform& transform, const IndexBox& clip) {
+                                          const volume::GridTransform& transform,
+                                          const IndexBox& clip) {
   require_memory(context, static_cast<double>(particles.size()) * sizeof(IndexParticle),
                  "the particles in index space");
   const double voxel = transform.voxel_size().x;
@@ -290,7 +291,7 @@ Side BlockTree::prove_leaf(const Int3& origin, std::span<const std::uint32_t> li
   ++parts_.tried;
   if (!parts_.pays())
     return Side::unknown;
-  constexpr std::int32_t half = leaf_dim / 2;
+  constexpr std::int32_t half = volume::leaf_dim / 2;
   std::vector<std::uint8_t>& masks = masks_[0];
   masks.resize(std::max(masks.size(), list.size()));
   ChildBounds bounds{};
@@ -346,7 +347,7 @@ void BlockTree::descend(const Int3& origin, std::int32_t size, std::span<const s
     for (const std::uint32_t n : list)
       largest = std::max(largest, local_[n].radius);
     bounding = largest > 0.5 * half;
-    if (half == leaf_dim) {
+    if (half == volume::leaf_dim) {
       ++children_.tried;
       bounding = bounding && children_.pays();
     }
@@ -356,8 +357,8 @@ void BlockTree::descend(const Int3& origin, std::int32_t size, std::span<const s
     kernels_.bound(local_.data(), list.data(), list.size(), children, masks.data(), bounds);
   else
     kernels_.reach(local_.data(), list.data(), list.size(), children,
-                   bounding_ && half > leaf_dim ? 1 : 0, masks.data());
-  if (bounding && half == leaf_dim)
+                   bounding_ && half > volume::leaf_dim ? 1 : 0, masks.data());
+  if (bounding && half == volume::leaf_dim)
     children_.spent += list.size() * 150;
 
   std::vector<std::uint32_t>& part = scratch_[level];
@@ -377,17 +378,17 @@ void BlockTree::descend(const Int3& origin, std::int32_t size, std::span<const s
     Side side = Side::unknown;
     if (bounding) {
       side = prove(child, half, bounds.lower[c], bounds.upper[c]);
-      if (half == leaf_dim && side != Side::unknown)
+      if (half == volume::leaf_dim && side != Side::unknown)
         children_.saved += count * 350 + 2000;
     }
-    if (bounding && side == Side::unknown && half == leaf_dim)
+    if (bounding && side == Side::unknown && half == volume::leaf_dim)
       side = prove_leaf(child, reaching);
     if (side != Side::unknown) {
-      const auto leaves = static_cast<std::uint64_t>(half / leaf_dim);
+      const auto leaves = static_cast<std::uint64_t>(half / volume::leaf_dim);
       lists_->skipped += leaves * leaves * leaves;
       if (side == Side::opposite)
         lists_->opposite.push_back({child, half});
-    } else if (half == leaf_dim) {
+    } else if (half == volume::leaf_dim) {
       emit(child, reaching);
     } else {
       descend(child, half, reaching, level + 1);
@@ -447,10 +448,11 @@ void visit_plan(BlockTree& tree, const LeafLists& plan, const BlockTree::Visit& 
     visit(n, pairs.subspan(plan.first[n], plan.first[n + 1] - plan.first[n]));
 }
 
-EvaluatedLeaves evaluate_plans(const Context& context, GridBuilder& builder,
-                               std::span<const IndexParticle> particles, const Blocks& blocks,
-                               const std::vector<LeafLists>& plans, const IndexBox& clip,
-                               const std::function<void(std::size_t, const LeafRef&)>& done) {
+EvaluatedLeaves
+evaluate_plans(const Context& context, volume::GridBuilder& builder,
+               std::span<const IndexParticle> particles, const Blocks& blocks,
+               const std::vector<LeafLists>& plans, const IndexBox& clip,
+               const std::function<void(std::size_t, const volume::LeafRef&)>& done) {
   std::vector<Int3> origins;
   std::vector<std::size_t> first{0};
   for (const LeafLists& plan : plans) {
@@ -468,7 +470,7 @@ EvaluatedLeaves evaluate_plans(const Context& context, GridBuilder& builder,
     for (std::size_t n = begin; n < end; ++n) {
       tree.load(particles, blocks, n);
       visit_plan(tree, plans[n], [&](std::size_t leaf, std::span<const std::uint32_t> list) {
-        const LeafRef& ref = result.leaves[first[n] + leaf];
+        const volume::LeafRef& ref = result.leaves[first[n] + leaf];
         evaluate_leaf(kernels, clip, tree.particles(), list, ref.origin, scratch, ref.values);
         pairs[n] += list.size();
         done(first[n] + leaf, ref);
@@ -482,7 +484,7 @@ EvaluatedLeaves evaluate_plans(const Context& context, GridBuilder& builder,
 
 bool contains(const IndexBox& box, const Int3& origin) {
   for (std::size_t axis = 0; axis < 3; ++axis)
-    if (origin[axis] < box.min[axis] || origin[axis] + leaf_dim - 1 > box.max[axis])
+    if (origin[axis] < box.min[axis] || origin[axis] + volume::leaf_dim - 1 > box.max[axis])
       return false;
   return true;
 }
@@ -504,7 +506,7 @@ std::array<std::uint64_t, 8> compare_leaf(const float* values, float bound, bool
   return words;
 }
 
-bool activate(const LeafRef& leaf) {
+bool activate(const volume::LeafRef& leaf) {
   const std::array<std::uint64_t, 8> words = compare_leaf(leaf.values, 0, /*unequal=*/true);
   std::uint64_t any = 0;
   for (std::size_t word = 0; word < 8; ++word) {
@@ -526,7 +528,7 @@ void evaluate_leaf(const DensityKernels& kernels, const IndexBox& clip,
   kernels.add(scratch.data(), scratch.size(), values);
   if (contains(clip, origin))
     return;
-  for (int offset = 0; offset < leaf_voxels; ++offset) {
+  for (int offset = 0; offset < volume::leaf_voxels; ++offset) {
     const Int3 ijk{origin[0] + (offset >> 6), origin[1] + (offset >> 3 & 7),
                    origin[2] + (offset & 7)};
     for (std::size_t axis = 0; axis < 3; ++axis)
@@ -535,4 +537,4 @@ void evaluate_leaf(const DensityKernels& kernels, const IndexBox& clip,
   }
 }
 
-} // namespace gewebe
+} // namespace gewebe::density

@@ -16,7 +16,7 @@
 #include <span>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::density {
 
 struct IndexBox {
   Int3 min, max; ///< inclusive
@@ -33,7 +33,8 @@ DensityKernels density_kernels(CpuLevel level);
 /// The particles with a voxel centre of `clip` in the box around their support, in index space and
 /// in their order. \throw Error if context.max_memory would not do
 std::vector<IndexParticle> to_index_space(const Context& context, const Particles& particles,
-                                          const GridTransform& transform, const IndexBox& clip);
+                                          const volume::GridTransform& transform,
+                                          const IndexBox& clip);
 
 /// Cubes of `size` voxels (a power of two, at least 16) with the particles that may reach them,
 /// enlarged on all sides by some margin.
@@ -124,16 +125,17 @@ void evaluate_leaf(const DensityKernels& kernels, const IndexBox& clip,
                    const Int3& origin, std::vector<LeafParticle>& scratch, float* values);
 
 struct EvaluatedLeaves {
-  std::vector<LeafRef> leaves; ///< of all plans, one after the other
-  std::uint64_t pairs = 0;     ///< of leaves and particles
+  std::vector<volume::LeafRef> leaves; ///< of all plans, one after the other
+  std::uint64_t pairs = 0;             ///< of leaves and particles
 };
 
 /// Adds all leaves of the plans to the grid and evaluates them there. Then, from the same thread,
 /// `done` gets the leaf's number.
-EvaluatedLeaves evaluate_plans(const Context& context, GridBuilder& builder,
-                               std::span<const IndexParticle> particles, const Blocks& blocks,
-                               const std::vector<LeafLists>& plans, const IndexBox& clip,
-                               const std::function<void(std::size_t, const LeafRef&)>& done);
+EvaluatedLeaves
+evaluate_plans(const Context& context, volume::GridBuilder& builder,
+               std::span<const IndexParticle> particles, const Blocks& blocks,
+               const std::vector<LeafLists>& plans, const IndexBox& clip,
+               const std::function<void(std::size_t, const volume::LeafRef&)>& done);
 
 /// Bit n of word w: is value 64 w + n above `bound`, or with `unequal`, is it another one?
 std::array<std::uint64_t, 8> compare_leaf(const float* values, float bound, bool unequal = false);
@@ -159,10 +161,10 @@ private:
 };
 
 /// Sets the active mask of a leaf: where the value isn't 0. False if that is nowhere.
-bool activate(const LeafRef& leaf);
+bool activate(const volume::LeafRef& leaf);
 
 /// Memory that a leaf takes in a grid.
-inline constexpr double leaf_bytes = leaf_voxels * sizeof(float) + 160;
+inline constexpr double leaf_bytes = volume::leaf_voxels * sizeof(float) + 160;
 
 /// The leaves of all blocks, with lists as long as these fit into a budget. What is done without
 /// lists goes down the octree a second time.
@@ -174,8 +176,8 @@ std::vector<LeafLists> plan_blocks(const Context& context, std::span<const Index
 void visit_plan(BlockTree& tree, const LeafLists& plan, const BlockTree::Visit& visit);
 
 /// density_band.cpp: the leaves that an isosurface crosses. `plans` of plan_blocks with it.
-Grid band_grid(const Context& context, std::span<const IndexParticle> particles,
-               const Blocks& blocks, const std::vector<LeafLists>& plans, const IndexBox& clip,
-               const GridInfo& info, DensityReport& report);
+volume::Grid band_grid(const Context& context, std::span<const IndexParticle> particles,
+                       const Blocks& blocks, const std::vector<LeafLists>& plans,
+                       const IndexBox& clip, const volume::GridInfo& info, DensityReport& report);
 
-} // namespace gewebe
+} // namespace gewebe::density

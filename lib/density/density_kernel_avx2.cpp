@@ -2,7 +2,7 @@
 
 #include <immintrin.h>
 
-namespace gewebe {
+namespace gewebe::density {
 namespace {
 
 /// Byte m of entry b: sixteen times the number of the m-th bit that is set in b.
@@ -210,4 +210,4 @@ void bound_children_avx2(const IndexParticle* particles, const std::uint32_t* li
                    _mm256_add_ps(_mm256_min_ps(upper, _mm256_add_ps(value, spread)), rounding));
 }
 
-} // namespace gewebe
+} // namespace gewebe::density

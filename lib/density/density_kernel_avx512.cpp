@@ -2,7 +2,7 @@
 
 #include <immintrin.h>
 
-namespace gewebe {
+namespace gewebe::density {
 namespace {
 
 // Of the intrinsics, those that put 0 where a bit of the mask isn't set: in GCC 12 the plain ones
@@ -96,4 +96,4 @@ void add_density_avx512(const LeafParticle* particles, std::size_t count, float*
   add_density<TwoRows>(particles, count, values);
 }
 
-} // namespace gewebe
+} // namespace gewebe::density

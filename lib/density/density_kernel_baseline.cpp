@@ -2,7 +2,7 @@
 
 #include <cmath>
 
-namespace gewebe {
+namespace gewebe::density {
 namespace {
 
 /// Accumulated over the particles, one slot a child.
@@ -141,4 +141,4 @@ void bound_children_baseline(const IndexParticle* particles, const std::uint32_t
   }
 }
 
-} // namespace gewebe
+} // namespace gewebe::density

@@ -5,7 +5,7 @@
 #include <cstddef>
 #include <cstdint>
 
-namespace gewebe {
+namespace gewebe::density {
 
 /// A particle as a leaf sees it: index units, relative to the centre of the leaf's first voxel.
 struct LeafParticle {
@@ -81,4 +81,4 @@ inline constexpr float curvature_bound = 4.9F;        ///< > 44/9
 inline constexpr float term_rounding = 8e-6F;         ///< × Σ |w|
 inline constexpr float accumulation_rounding = 2e-7F; ///< × count × Σ |w| largest density
 
-} // namespace gewebe
+} // namespace gewebe::density

@@ -1,6 +1,6 @@
 #include "dynamics/body_motion.h"
 
-namespace gewebe {
+namespace gewebe::dynamics {
 
 namespace {
 
@@ -22,4 +22,4 @@ void BodyMotion::end_contact_step(std::span<const contact::VertexForce> /*forces
   refuse();
 }
 
-} // namespace gewebe
+} // namespace gewebe::dynamics

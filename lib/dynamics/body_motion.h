@@ -16,7 +16,7 @@
 #include <string>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::dynamics {
 
 /// Error of an integration that can't continue.
 class MotionError : public Error {
@@ -55,7 +55,7 @@ public:
   /// Sets the load from now on. Displaced nodes get their displacement at once. An unchanged load
   /// does not wake the object.
   /// \pre nodes exist, no displacement along an axis that the model holds
-  virtual void set_load(const Load& load, double time) = 0;
+  virtual void set_load(const contact::Load& load, double time) = 0;
 
   /// Integrates from `start` over `duration` in equal steps of at most `largest_step`. An object at
   /// rest (see resting()) makes no step. \return number of steps
@@ -85,7 +85,7 @@ public:
   /// Reactions of the displaced nodes: the force on the object, per node in ascending order; 0
   /// along
   /// axes that the model holds.
-  virtual std::vector<NodeVector> contact_forces() const = 0;
+  virtual std::vector<contact::NodeVector> contact_forces() const = 0;
 
   /// What a viscoelastic body remembers; nothing of others.
   virtual std::any memory() { return {}; }
@@ -118,4 +118,4 @@ public:
   virtual std::optional<MotionEnergies> energies() const { return std::nullopt; }
 };
 
-} // namespace gewebe
+} // namespace gewebe::dynamics

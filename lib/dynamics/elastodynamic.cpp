@@ -13,7 +13,7 @@
 // Based on: E. Hairer, C. Lubich, G. Wanner, Geometric numerical integration illustrated by the
 // Störmer-Verlet method, 2003 (symplectic Euler).
 
-namespace gewebe {
+namespace gewebe::dynamics {
 
 namespace {
 
@@ -57,22 +57,22 @@ std::pair<std::size_t, std::size_t> share(const SpringLayout& layout, int thread
 
 } // namespace
 
-Elastodynamic::Elastodynamic(const Model& model)
+Elastodynamic::Elastodynamic(const model::Model& model)
     : model_(model), network_(spring_network(model)), layout_(spring_layout(model)),
       rows_(std::vector<NodeRow>(model.nodes.size())),
       next_(std::vector<NodeRow>(model.nodes.size())), motion_(model.nodes.size()) {
   Box3 box;
   require_masses(model);
-  for (const Node& node : model.nodes)
+  for (const model::Node& node : model.nodes)
     box.add(node.position);
   size_ = box.longest_side();
   apply_load();
 }
 
-void Elastodynamic::set_load(const Load& load, double time) {
+void Elastodynamic::set_load(const contact::Load& load, double time) {
   if (load == *load_)
     return;
-  load_ = std::make_shared<const Load>(load);
+  load_ = std::make_shared<const contact::Load>(load);
   time_ = time;
   apply_load();
 }
@@ -83,9 +83,9 @@ void Elastodynamic::apply_load() {
   drives_.clear();
   for (std::size_t row = 0; row < layout_.movable; ++row) {
     const std::uint32_t i = layout_.node_of_row[row];
-    const Node& node = model_.nodes[i];
+    const model::Node& node = model_.nodes[i];
     for (int a = 0; a < 3; ++a)
-      traits_[row].inverse_mass[a] = is_fixed(model_, i, a) ? 0 : 1 / node.mass;
+      traits_[row].inverse_mass[a] = contact::is_fixed(model_, i, a) ? 0 : 1 / node.mass;
     traits_[row].drag = node.drag;
     put(node.mass * load_->gravity, traits_[row].constant);
   }
@@ -184,11 +184,11 @@ void Elastodynamic::restore(const State& state) {
 
 template <class At>
 Vec3 Elastodynamic::outer_force(const Driven& driven, double time, const At& position) const {
-  Vec3 force = driven.steady + pulse(time, driven.period) * driven.pulsing;
+  Vec3 force = driven.steady + contact::pulse(time, driven.period) * driven.pulsing;
   if (driven.around.empty())
     return force;
-  const double sixth =
-      driven.pressure.pressure * pulse(time, driven.pressure.period) / 6; // of twice the area
+  const double sixth = driven.pressure.pressure * contact::pulse(time, driven.pressure.period) /
+                       6; // of twice the area
   for (const Triangle& t : driven.around) {
     const Vec3 a = position(t[0]), b = position(t[1]), c = position(t[2]);
     force += sixth * cross(b - a, c - a);
@@ -334,18 +334,18 @@ void Elastodynamic::fail(double time, const char* what) const {
   throw MotionError(node, time, what);
 }
 
-std::vector<NodeVector> Elastodynamic::contact_forces() const {
-  std::vector<NodeVector> forces;
+std::vector<contact::NodeVector> Elastodynamic::contact_forces() const {
+  std::vector<contact::NodeVector> forces;
   forces.reserve(load_->displacement.size());
   const std::span<const NodeMotion> now = motion();
   for (const auto& [node, displacement] : load_->displacement) {
     Vec3 force = -(spring_force(network_, now, node) + outer_force(node, time_));
     for (int a = 0; a < 3; ++a)
-      if (is_fixed(model_, node, a) || force[a] == 0)
+      if (contact::is_fixed(model_, node, a) || force[a] == 0)
         force[a] = 0; // no -0
     forces.push_back({node, force});
   }
   return forces;
 }
 
-} // namespace gewebe
+} // namespace gewebe::dynamics

@@ -25,7 +25,7 @@
 #include <span>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::dynamics {
 
 /// The default integration step over safe_step(model): below 1, since stability is proven for the
 /// model at rest alone.
@@ -36,9 +36,9 @@ class Elastodynamic final : public BodyMotion {
 public:
   /// Starts at rest. Keeps a reference to the model.
   /// \pre check_model(model) passes   \throw Error if a node can move but has no mass
-  explicit Elastodynamic(const Model& model);
+  explicit Elastodynamic(const model::Model& model);
 
-  void set_load(const Load& load, double time = 0) override;
+  void set_load(const contact::Load& load, double time = 0) override;
   std::uint64_t advance(double duration, double largest_step, const Context& context,
                         double start = 0) override;
 
@@ -52,7 +52,7 @@ public:
 
   /// Contents of a snapshot.
   struct State {
-    std::shared_ptr<const Load> load;
+    std::shared_ptr<const contact::Load> load;
     double time = 0, loaded = 0;
     CopyOnWrite<std::vector<NodeRow>> rows;
     bool resting = false;
@@ -66,7 +66,7 @@ public:
     restore(std::any_cast<const State&>(snapshot));
   }
 
-  std::vector<NodeVector> contact_forces() const override;
+  std::vector<contact::NodeVector> contact_forces() const override;
 
 private:
   /// A row whose force changes with time or shape.
@@ -74,12 +74,12 @@ private:
     std::uint32_t node = 0;
     Vec3 steady, pulsing;
     double period = 0;
-    NodePressure pressure;
+    contact::NodePressure pressure;
     std::vector<Triangle> around; ///< if there is a pressure
   };
   struct RampedNode {
     std::uint32_t node = 0;
-    Ramp way;
+    contact::Ramp way;
   };
   struct Drive { ///< of a block
     std::vector<Driven> driven;
@@ -97,10 +97,10 @@ private:
   Vec3 outer_force(std::uint32_t node, double time) const;
   [[noreturn]] void fail(double time, const char* what) const;
 
-  const Model& model_;
+  const model::Model& model_;
   SpringNetwork network_;
   SpringLayout layout_;
-  std::shared_ptr<const Load> load_ = std::make_shared<const Load>();
+  std::shared_ptr<const contact::Load> load_ = std::make_shared<const contact::Load>();
   double time_ = 0;   ///< of the state
   double loaded_ = 0; ///< when the load was last applied
   std::vector<NodeTraits> traits_;
@@ -112,4 +112,4 @@ private:
   bool resting_ = false;
 };
 
-} // namespace gewebe
+} // namespace gewebe::dynamics

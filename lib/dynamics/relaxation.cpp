@@ -16,7 +16,7 @@
 
 // Based on: Underwood, Dynamic relaxation, 1983 (drag that damps the slowest mode critically).
 
-namespace gewebe {
+namespace gewebe::dynamics {
 
 namespace {
 
@@ -25,7 +25,8 @@ constexpr double largest_move = 1e-4; // of the shortest spring
 constexpr double max_periods = 1000;
 
 /// √ of the least ω² with K x = ω² M x, by inverse iteration; M by node.
-double slowest_mode(const StiffnessMatrix& matrix, const Factor& factor, const Model& model) {
+double slowest_mode(const linalg::StiffnessMatrix& matrix, const linalg::Factor& factor,
+                    const model::Model& model) {
   const std::size_t n = matrix.order();
   std::vector<double> mass(n), x(n), y(n), load(n);
   for (std::size_t r = 0; r < n; ++r) {
@@ -52,17 +53,17 @@ double slowest_mode(const StiffnessMatrix& matrix, const Factor& factor, const M
 }
 
 /// The same springs with masses and drag that let it rest soon.
-Model soon_at_rest(Model model, const StiffnessMatrix& matrix, const Factor& factor,
-                   double& slowest) {
-  for (Node& node : model.nodes)
+model::Model soon_at_rest(model::Model model, const linalg::StiffnessMatrix& matrix,
+                          const linalg::Factor& factor, double& slowest) {
+  for (model::Node& node : model.nodes)
     node.mass = node.drag = 0;
-  for (Spring& s : model.springs) {
+  for (model::Spring& s : model.springs) {
     s.damping = 0;
     model.nodes[s.i].mass += 2 * s.stiffness;
     model.nodes[s.j].mass += 2 * s.stiffness;
   }
   slowest = slowest_mode(matrix, factor, model);
-  for (Node& node : model.nodes)
+  for (model::Node& node : model.nodes)
     node.drag = 2 * slowest * node.mass;
   return model;
 }
@@ -77,18 +78,20 @@ struct Workspace {
 
 class Relaxation {
 public:
-  Relaxation(const Model& model, const StiffnessMatrix& matrix, const Factor& factor, double norm,
-             const RelaxOptions& options, const Context& context)
+  Relaxation(const model::Model& model, const linalg::StiffnessMatrix& matrix,
+             const linalg::Factor& factor, double norm, const RelaxOptions& options,
+             const Context& context)
       : model_(soon_at_rest(model, matrix, factor, slowest_)), layout_(spring_layout(model_)),
         matrix_(matrix), factor_(factor), norm_(norm), options_(options), context_(context),
-        step_(safe_step_fraction * safe_step(model_)), traits_(layout_.movable) {
+        step_(safe_step_fraction * model::safe_step(model_)), traits_(layout_.movable) {
     for (std::size_t row = 0; row < layout_.movable; ++row) {
       const std::uint32_t i = layout_.node_of_row[row];
       for (int a = 0; a < 3; ++a)
-        traits_[row].inverse_mass[a] = is_fixed(model_, i, a) ? 0 : 1 / model_.nodes[i].mass;
+        traits_[row].inverse_mass[a] =
+            contact::is_fixed(model_, i, a) ? 0 : 1 / model_.nodes[i].mass;
       traits_[row].drag = model_.nodes[i].drag;
     }
-    for (const Spring& s : model_.springs)
+    for (const model::Spring& s : model_.springs)
       shortest_ = std::min(shortest_,
                            gewebe::norm(model_.nodes[s.j].position - model_.nodes[s.i].position));
     const double steps = 2 * std::numbers::pi / (slowest_ * step_) / checks_a_period;
@@ -185,14 +188,15 @@ private:
     work.load[row] = 1;
     for (std::size_t r = 0; r < work.rows.size(); ++r)
       work.rows[r] = column[static_cast<std::size_t>(matrix_.axis_of_row[r])];
-    work.residual = std::max(work.residual, backward_error(matrix_, norm_, work.rows, work.load));
+    work.residual =
+        std::max(work.residual, linalg::backward_error(matrix_, norm_, work.rows, work.load));
   }
 
   double slowest_ = 0;
-  Model model_;
+  model::Model model_;
   SpringLayout layout_;
-  const StiffnessMatrix& matrix_;
-  const Factor& factor_;
+  const linalg::StiffnessMatrix& matrix_;
+  const linalg::Factor& factor_;
   double norm_;
   double shortest_ = std::numeric_limits<double>::infinity(); ///< spring, mm
   RelaxOptions options_;
@@ -204,10 +208,10 @@ private:
 
 } // namespace
 
-RelaxFigures relaxed_columns(const Model& model, const StiffnessMatrix& matrix,
-                             const Factor& factor, double norm,
+RelaxFigures relaxed_columns(const model::Model& model, const linalg::StiffnessMatrix& matrix,
+                             const linalg::Factor& factor, double norm,
                              std::span<const std::uint32_t> nodes, const RelaxOptions& options,
-                             const Context& context, ColumnSink& sink) {
+                             const Context& context, columns::ColumnSink& sink) {
   const Relaxation relaxation(model, matrix, factor, norm, options, context);
   Context quiet = context;
   quiet.progress = nullptr;
@@ -232,4 +236,4 @@ RelaxFigures relaxed_columns(const Model& model, const StiffnessMatrix& matrix,
   return figures;
 }
 
-} // namespace gewebe
+} // namespace gewebe::dynamics

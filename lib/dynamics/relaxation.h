@@ -20,7 +20,7 @@
 #include <cstdint>
 #include <span>
 
-namespace gewebe {
+namespace gewebe::dynamics {
 
 struct RelaxOptions {
   /// f, 1e-6 N; 0: for each pull the force that moves the model by at most 1e-4 of the shortest
@@ -46,9 +46,9 @@ struct RelaxFigures {
 /// \pre nodes < n, ascending; matrix and factor are of this model;
 /// \throw Error if a pull doesn't come to rest within 1,000 periods of the slowest mode or its
 /// motion is no longer finite; what the sink throws; Cancelled
-RelaxFigures relaxed_columns(const Model& model, const StiffnessMatrix& matrix,
-                             const Factor& factor, double norm,
+RelaxFigures relaxed_columns(const model::Model& model, const linalg::StiffnessMatrix& matrix,
+                             const linalg::Factor& factor, double norm,
                              std::span<const std::uint32_t> nodes, const RelaxOptions& options,
-                             const Context& context, ColumnSink& sink);
+                             const Context& context, columns::ColumnSink& sink);
 
-} // namespace gewebe
+} // namespace gewebe::dynamics

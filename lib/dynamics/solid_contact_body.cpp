@@ -7,7 +7,7 @@
 #include <cmath>
 #include <utility>
 
-namespace gewebe {
+namespace gewebe::dynamics {
 
 using contact::Block3, contact::VertexForce;
 
@@ -134,4 +134,4 @@ void SolidContactBody::move(double share, std::span<const VertexForce> forces) {
   motion_.move_iterate(share, change, context_);
 }
 
-} // namespace gewebe
+} // namespace gewebe::dynamics

@@ -16,13 +16,13 @@
 #include <utility>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::dynamics {
 
 /// Contact body of one SolidMotion.
 class SolidContactBody final : public contact::ContactBody {
 public:
   /// \param vertices  nodes of the collision surface, ascending. Keeps references to all.
-  SolidContactBody(SolidMotion& motion, const std::vector<std::uint32_t>& vertices,
+  SolidContactBody(integrator::SolidMotion& motion, const std::vector<std::uint32_t>& vertices,
                    std::size_t nodes)
       : motion_(motion), vertices_(vertices), axes_(3 * nodes) {}
 
@@ -67,7 +67,7 @@ private:
   void make_room(std::span<const std::uint32_t> vertices, std::size_t more);
   void spread(std::span<const contact::VertexForce> forces);
 
-  SolidMotion& motion_;
+  integrator::SolidMotion& motion_;
   const std::vector<std::uint32_t>& vertices_;
   std::size_t axes_;
   Context context_;
@@ -86,4 +86,4 @@ private:
                              ///< serves again behind a tangent
 };
 
-} // namespace gewebe
+} // namespace gewebe::dynamics

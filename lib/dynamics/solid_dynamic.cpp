@@ -16,7 +16,7 @@
 #include <string>
 #include <utility>
 
-namespace gewebe {
+namespace gewebe::dynamics {
 
 namespace {
 
@@ -43,28 +43,29 @@ bool about(double value, double expected) {
 
 /// What moves along with the elements.
 struct Net {
-  std::vector<SolidSpring> springs;
+  std::vector<integrator::SolidSpring> springs;
   std::vector<double> masses, drag;
 };
 
 /// Springs, masses of nodes and drag per mass.
-Net net_of(const Model& model) {
+Net net_of(const model::Model& model) {
   Net net;
   std::vector<std::uint8_t> tied(model.nodes.size());
-  for (const Spring& s : model.springs) {
+  for (const model::Spring& s : model.springs) {
     net.springs.push_back({s.i, s.j, s.stiffness, s.damping, s.rest});
     tied[s.i] = tied[s.j] = 1;
   }
-  const std::vector<double> masses = solid_masses(element_mesh(model), element_materials(model));
+  const std::vector<double> masses =
+      fem::solid_masses(fem::element_mesh(model), fem::element_materials(model));
   for (std::size_t i = 0; i < model.nodes.size(); ++i) {
-    const Node& node = model.nodes[i];
+    const model::Node& node = model.nodes[i];
     const std::string name = "node " + std::to_string(i);
     if (!(masses[i] > 0) && tied[i] == 0 && !model.tetrahedra.empty())
       throw Error(name + " is in no tetrahedron, expected none such of a solid that moves");
     const bool of_elements = masses[i] > 0 && about(node.mass, masses[i]);
     if (masses[i] > 0 && !of_elements && !(node.mass > masses[i]))
-      throw Error(name + " has a mass of " + number_text(node.mass) +
-                  " g, expected at least that of its tetrahedra, " + number_text(masses[i]) +
+      throw Error(name + " has a mass of " + text::number_text(node.mass) +
+                  " g, expected at least that of its tetrahedra, " + text::number_text(masses[i]) +
                   " g, of a solid that moves");
     const bool massless = node.mass == 0; // and stays where it is: any mass will do
     net.masses.push_back(massless ? 1 : of_elements ? masses[i] : node.mass);
@@ -76,9 +77,10 @@ Net net_of(const Model& model) {
 
 } // namespace
 
-SolidDynamic::SolidDynamic(const Model& model, const SolidChoice& choice, const Context& context)
+SolidDynamic::SolidDynamic(const model::Model& model, const integrator::SolidChoice& choice,
+                           const Context& context)
     : model_(model), context_(context), motion_(model.nodes.size()) {
-  options_.law = law_of(model, choice.law).value_or(SolidLaw::corotational);
+  options_.law = law_of(model, choice.law).value_or(integrator::SolidLaw::corotational);
   options_.damping = choice.damping.value_or(options_.damping);
   if (!model.springs.empty())
     options_.max_rounds = rounds_with_springs;
@@ -95,7 +97,7 @@ SolidDynamic::SolidDynamic(const Model& model, const SolidChoice& choice, const 
   }
   Box3 box;
   std::vector<double>& places = state_.places.write();
-  for (const Node& node : model.nodes) {
+  for (const model::Node& node : model.nodes) {
     box.add(node.position);
     places.insert(places.end(), {node.position.x, node.position.y, node.position.z});
   }
@@ -106,12 +108,13 @@ SolidDynamic::SolidDynamic(const Model& model, const SolidChoice& choice, const 
   (void)engine(context);
 }
 
-SolidMotion& SolidDynamic::engine(const Context& context) {
+integrator::SolidMotion& SolidDynamic::engine(const Context& context) {
   if (!engine_) {
     const Net net = net_of(model_);
-    engine_.emplace(element_mesh(model_), element_materials(model_),
-                    SolidNet{net.springs, net.masses, net.drag, model_.triangles, bulk_}, options_,
-                    context);
+    engine_.emplace(
+        fem::element_mesh(model_), fem::element_materials(model_),
+        integrator::SolidNet{net.springs, net.masses, net.drag, model_.triangles, bulk_}, options_,
+        context);
     engine_->hold(held_);
     engine_->restore(*state_.places, *state_.velocity, context);
   } else if (behind_) {
@@ -122,23 +125,24 @@ SolidMotion& SolidDynamic::engine(const Context& context) {
   return *engine_;
 }
 
-void SolidDynamic::set_load(const Load& load, double time) {
+void SolidDynamic::set_load(const contact::Load& load, double time) {
   if (load == *state_.load)
     return;
-  state_.load = std::make_shared<const Load>(load);
+  state_.load = std::make_shared<const contact::Load>(load);
   apply_load(time);
 }
 
 /// What follows from the load alone.
 void SolidDynamic::read_load() {
-  const Load& load = *state_.load;
+  const contact::Load& load = *state_.load;
   held_.assign(3 * model_.nodes.size(), 0);
   for (std::uint32_t i = 0; i < model_.nodes.size(); ++i)
     for (int a = 0; a < 3; ++a)
-      held_[axis_of(i, a)] = is_fixed(model_, i, a) || load.displacement.contains(i) ? 1 : 0;
+      held_[axis_of(i, a)] =
+          contact::is_fixed(model_, i, a) || load.displacement.contains(i) ? 1 : 0;
   all_held_ = std::ranges::all_of(held_, [](std::uint8_t held) { return held != 0; });
   if (weighed_ != load.gravity) {
-    weight_ = weight_of(model_, load.gravity);
+    weight_ = fem::weight_of(model_, load.gravity);
     weighed_ = load.gravity;
   }
   steady_ = weight_;
@@ -146,7 +150,7 @@ void SolidDynamic::read_load() {
     if (!load.force_period.contains(node))
       for (int a = 0; a < 3; ++a)
         steady_[axis_of(node, a)] += force[a];
-  pressed_ = pressed_corners(load, model_);
+  pressed_ = contact::pressed_corners(load, model_);
 }
 
 /// Where a displaced node stands.
@@ -178,7 +182,7 @@ void SolidDynamic::apply_load(double time) {
   if (engine_ && jumped)
     engine_->restore(places, velocity, context_);
   if (!state_.load->displacement.empty()) {
-    SolidMotion& moving = engine(context_);
+    integrator::SolidMotion& moving = engine(context_);
     moving.set_load(forces_at(time));
     moving.find_reactions(context_);
     state_.reactions.replace().assign(moving.reactions().begin(), moving.reactions().end());
@@ -198,9 +202,9 @@ std::vector<double> SolidDynamic::forces_at(double time) const {
       forces[axis_of(node, a)] += force[a];
   };
   for (const auto& [node, period] : state_.load->force_period)
-    add(node, pulse(time, period) * state_.load->force.at(node));
+    add(node, contact::pulse(time, period) * state_.load->force.at(node));
   const std::span<const double> places = engine_ ? engine_->places() : *state_.places;
-  press(
+  contact::press(
       pressed_, time, [&](std::uint32_t node) { return vector_at(places, node); }, add);
   return forces;
 }
@@ -239,10 +243,10 @@ std::any SolidDynamic::memory() {
 }
 
 void SolidDynamic::remember(const std::any& memory) {
-  const auto* const state = std::any_cast<MemoryState>(&memory);
+  const auto* const state = std::any_cast<viscous::MemoryState>(&memory);
   if (state == nullptr || !state->tensors)
     return;
-  SolidMotion& moving = engine(context_);
+  integrator::SolidMotion& moving = engine(context_);
   moving.set_memory(*state);
   moving.restore(*state_.places, *state_.velocity, context_);
   state_.version = ++versions_;
@@ -258,7 +262,7 @@ std::any SolidDynamic::snapshot() const {
 void SolidDynamic::go_back(const std::any& snapshot) {
   const State& was = std::any_cast<const State&>(snapshot);
   const bool same = was.version == state_.version;
-  const std::shared_ptr<const SolidMotion::Past> past =
+  const std::shared_ptr<const integrator::SolidMotion::Past> past =
       same && !behind_ ? nullptr : was.past; // else the engine has it
   state_ = was;
   state_.past = past;
@@ -316,7 +320,7 @@ std::uint64_t SolidDynamic::advance(double duration, double largest_step, const 
 
 /// Forces, and where held axes go: the target, or nothing where they stay.
 std::vector<double> SolidDynamic::begin_step(double from, double to) {
-  SolidMotion& moving = *engine_;
+  integrator::SolidMotion& moving = *engine_;
   const std::vector<double> forces = forces_at(to);
   for (std::size_t axis = 0; axis < forces.size(); ++axis)
     if (!(std::abs(forces[axis]) <= largest_force))
@@ -354,13 +358,13 @@ void SolidDynamic::hold_all(std::span<const double> target, double h, const Cont
 /// Behind a step: whether it has come to rest. \param room  mm, that counts as no motion
 void SolidDynamic::settle(std::span<const double> before, double to, double room,
                           const Context& context) {
-  SolidMotion& moving = *engine_;
+  integrator::SolidMotion& moving = *engine_;
   double moved = 0, largest = 0;
   for (std::uint32_t i = 0; i < model_.nodes.size(); ++i)
     for (int a = 0; a < 3; ++a) {
       const std::size_t axis = axis_of(i, a);
       const double by = std::abs(moving.places()[axis] - before[axis]);
-      moved = larger(moved, by);
+      moved = numeric::larger(moved, by);
       largest = std::max(largest, std::abs(before[axis] - model_.nodes[i].position[a]));
     }
   const bool quiet = moved <= std::max({rest_tolerance * largest, rest_rounding * size_, room}) &&
@@ -375,7 +379,7 @@ void SolidDynamic::settle(std::span<const double> before, double to, double room
 }
 
 void SolidDynamic::step(double h, double from, double to, const Context& context) {
-  SolidMotion& moving = *engine_;
+  integrator::SolidMotion& moving = *engine_;
   const std::vector<double> before(moving.places().begin(), moving.places().end());
   const std::vector<double> target = begin_step(from, to);
   if (all_held_) {
@@ -383,7 +387,7 @@ void SolidDynamic::step(double h, double from, double to, const Context& context
   } else {
     if (!target.empty())
       moving.move_held(target);
-    const SolidStep took = moving.step(h, context);
+    const integrator::SolidStep took = moving.step(h, context);
     counts_.rounds += static_cast<std::uint64_t>(took.rounds);
     counts_.factors += static_cast<std::uint64_t>(took.factorisations);
     counts_.unfinished += took.left <= options_.tolerance ? 0 : 1;
@@ -403,7 +407,7 @@ const contact::ModelSurface& SolidDynamic::collision_surface() {
 
 contact::ContactBody& SolidDynamic::begin_contact_step(double from, double to,
                                                        const Context& context) {
-  SolidMotion& moving = engine(context);
+  integrator::SolidMotion& moving = engine(context);
   double h = to - from;
   if (std::abs(h - state_.last_step) <= same_step * state_.last_step)
     h = state_.last_step; // so that the factor serves on
@@ -439,10 +443,10 @@ contact::ContactBody& SolidDynamic::begin_contact_step(double from, double to,
 
 void SolidDynamic::end_contact_step(std::span<const contact::VertexForce> forces, bool still,
                                     const Context& context) {
-  SolidMotion& moving = *engine_;
+  integrator::SolidMotion& moving = *engine_;
   const std::vector<double> before(moving.places().begin(), moving.places().end());
-  SolidStep took;
-  MemoryState was; // no time passes while surfaces part
+  integrator::SolidStep took;
+  viscous::MemoryState was; // no time passes while surfaces part
   if (all_held_) {
     std::vector<double> all = load_;
     for (const contact::VertexForce& f : forces)
@@ -509,13 +513,13 @@ void SolidDynamic::take_over() {
   state_.energies = {engine_->kinetic_energy(), engine_->elastic_energy()};
 }
 
-std::vector<NodeVector> SolidDynamic::contact_forces() const {
-  std::vector<NodeVector> forces;
+std::vector<contact::NodeVector> SolidDynamic::contact_forces() const {
+  std::vector<contact::NodeVector> forces;
   forces.reserve(state_.load->displacement.size());
   for (const auto& [node, displacement] : state_.load->displacement) {
     Vec3 force = vector_at(*state_.reactions, node);
     for (int a = 0; a < 3; ++a)
-      if (is_fixed(model_, node, a) || force[a] == 0)
+      if (contact::is_fixed(model_, node, a) || force[a] == 0)
         force[a] = 0; // no -0
     forces.push_back({node, force});
   }
@@ -530,4 +534,4 @@ std::optional<MotionEnergies> SolidDynamic::energies() const {
   return state_.energies;
 }
 
-} // namespace gewebe
+} // namespace gewebe::dynamics

@@ -26,7 +26,7 @@
 #include <span>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::dynamics {
 
 /// Implicit integration of one body.
 class SolidDynamic final : public BodyMotion {
@@ -37,9 +37,10 @@ public:
   /// \throw Error if a node of a model with tetrahedra belongs to no tetrahedron and no spring, or
   /// if its mass differs from that of its tetrahedra
   /// \throw Error as SolidMotion
-  SolidDynamic(const Model& model, const SolidChoice& choice, const Context& context);
+  SolidDynamic(const model::Model& model, const integrator::SolidChoice& choice,
+               const Context& context);
 
-  void set_load(const Load& load, double time) override;
+  void set_load(const contact::Load& load, double time) override;
   std::uint64_t advance(double duration, double largest_step, const Context& context,
                         double start = 0) override;
 
@@ -57,7 +58,7 @@ public:
   std::any snapshot() const override;
   void go_back(const std::any& snapshot) override;
 
-  std::vector<NodeVector> contact_forces() const override;
+  std::vector<contact::NodeVector> contact_forces() const override;
 
   bool has_contact_steps() const override { return true; }
   const contact::ModelSurface& collision_surface() override;
@@ -72,7 +73,7 @@ public:
 private:
   /// Contents of a snapshot.
   struct State {
-    std::shared_ptr<const Load> load = std::make_shared<const Load>();
+    std::shared_ptr<const contact::Load> load = std::make_shared<const contact::Load>();
     double time = 0;
     CopyOnWrite<std::vector<double>> places{}, velocity{}, reactions{}; ///< 3 n
     MotionEnergies energies;
@@ -81,7 +82,7 @@ private:
     bool resting = false;
     double last_step = 0; ///< of the engine
     /// What earlier steps left to the engine; null in the present state, which the engine has.
-    std::shared_ptr<const SolidMotion::Past> past{};
+    std::shared_ptr<const integrator::SolidMotion::Past> past{};
 
     /// Contact forces at the end of the last step, by ascending vertex.
     std::vector<contact::VertexForce> contact{};
@@ -91,7 +92,7 @@ private:
   void apply_load(double time);
   void take_over();
   void begin_anew();
-  SolidMotion& engine(const Context& context);
+  integrator::SolidMotion& engine(const Context& context);
   std::vector<double> forces_at(double time) const;
   Vec3 held_at(std::uint32_t node, double time) const;
   double typical_force(double h, double strained) const;
@@ -100,8 +101,8 @@ private:
   void hold_all(std::span<const double> target, double h, const Context& context);
   void settle(std::span<const double> before, double to, double room, const Context& context);
 
-  const Model& model_;
-  SolidMotionOptions options_;
+  const model::Model& model_;
+  integrator::SolidMotionOptions options_;
   double bulk_ = 0; ///< bulk modulus of the filling of a net; 0: not filled
   Context context_;
   double size_ = 0; ///< longest side of the box at rest
@@ -113,9 +114,9 @@ private:
   bool all_held_ = false;
   std::optional<Vec3> weighed_; ///< gravity of weight_
   std::vector<double> weight_, steady_;
-  std::vector<PressedCorner> pressed_;
+  std::vector<contact::PressedCorner> pressed_;
 
-  std::optional<SolidMotion> engine_;
+  std::optional<integrator::SolidMotion> engine_;
   bool behind_ = false; ///< the engine has to go back to the state first
   std::optional<contact::ModelSurface> surface_;
   std::optional<contact::TypicalContact> typical_; ///< of the model
@@ -129,4 +130,4 @@ private:
   mutable bool motion_shown_ = false;
 };
 
-} // namespace gewebe
+} // namespace gewebe::dynamics

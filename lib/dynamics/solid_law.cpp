@@ -6,31 +6,34 @@
 
 #include <algorithm>
 
-namespace gewebe {
+namespace gewebe::dynamics {
 
-std::optional<SolidLaw> law_of(const Model& model, const std::optional<SolidLaw>& chosen) {
-  std::optional<SolidLaw> law = chosen;
-  for (const Material& m : model.materials) {
+std::optional<integrator::SolidLaw> law_of(const model::Model& model,
+                                           const std::optional<integrator::SolidLaw>& chosen) {
+  std::optional<integrator::SolidLaw> law = chosen;
+  for (const model::Material& m : model.materials) {
     if (!m.prony.empty() && !model.tetrahedra.empty()) {
-      if (law == SolidLaw::corotational)
-        throw Error("material '" + m.name + "' is viscoelastic (" + prony_text(m.prony) +
+      if (law == integrator::SolidLaw::corotational)
+        throw Error("material '" + m.name + "' is viscoelastic (" + model::prony_text(m.prony) +
                     "), expected no law= or law=neo-hookean");
-      law = SolidLaw::hyperelastic;
+      law = integrator::SolidLaw::hyperelastic;
     }
-    if (!m.law || law == SolidLaw::corotational)
+    if (!m.law || law == integrator::SolidLaw::corotational)
       continue;
-    if (m.law->kind == HyperelasticLaw::neo_hookean ||
-        (chosen && m.law->kind != HyperelasticLaw::stable_neo_hookean))
-      throw Error("material '" + m.name + "' has the law " + law_text(*m.law) + ", expected " +
+    if (m.law->kind == model::HyperelasticLaw::neo_hookean ||
+        (chosen && m.law->kind != model::HyperelasticLaw::stable_neo_hookean))
+      throw Error("material '" + m.name + "' has the law " + model::law_text(*m.law) +
+                  ", expected " +
                   (chosen ? "no law= or law=corotational" : "another one, such as neo-hookean"));
-    law = SolidLaw::hyperelastic;
+    law = integrator::SolidLaw::hyperelastic;
   }
   return law;
 }
 
-bool is_viscoelastic(const Model& model) {
+bool is_viscoelastic(const model::Model& model) {
   return !model.tetrahedra.empty() &&
-         std::ranges::any_of(model.materials, [](const Material& m) { return !m.prony.empty(); });
+         std::ranges::any_of(model.materials,
+                             [](const model::Material& m) { return !m.prony.empty(); });
 }
 
-} // namespace gewebe
+} // namespace gewebe::dynamics

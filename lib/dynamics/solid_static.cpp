@@ -14,7 +14,7 @@
 #include <string>
 #include <utility>
 
-namespace gewebe {
+namespace gewebe::dynamics {
 
 namespace {
 
@@ -39,11 +39,11 @@ constexpr double relaxation_step = 0.1;
 constexpr double gradual_step = 0.1, gradual_part = 1.0 / 8, most_gradual = 256;
 
 /// The load on the way between two. \param places  where nodes stood under `from`
-Load part_of_way(const Model& model, const Load& from, const Load& to,
-                 std::span<const double> places, double part) {
+contact::Load part_of_way(const model::Model& model, const contact::Load& from,
+                          const contact::Load& to, std::span<const double> places, double part) {
   if (part == 1)
     return to;
-  Load load;
+  contact::Load load;
   load.gravity = from.gravity + part * (to.gravity - from.gravity);
   for (const auto& [node, f] : from.force)
     load.force[node] += (1 - part) * f;
@@ -63,11 +63,11 @@ Load part_of_way(const Model& model, const Load& from, const Load& to,
 } // namespace
 
 struct SolidStatic::State {
-  const Model& model;
+  const model::Model& model;
   Context context;
-  SolidLaw law;
+  integrator::SolidLaw law;
   std::vector<double> rest; // places
-  SolidMotion engine;
+  integrator::SolidMotion engine;
   std::vector<std::uint8_t> held; // of the engine
   bool prepared = false;          // its factor, for what is held
   std::optional<Vec3> weighed;
@@ -77,14 +77,14 @@ struct SolidStatic::State {
   contact::TypicalContact typical;
   std::vector<std::uint32_t> vertices; // of the body
   std::unique_ptr<SolidContactBody> body;
-  Load acting; // in the step with contact
+  contact::Load acting; // in the step with contact
   RestTime acting_time;
-  double shortest = 0; // s, of a Prony series; 0: elastic
-  MemoryState memory;  // from which the next shape is sought
+  double shortest = 0;         // s, of a Prony series; 0: elastic
+  viscous::MemoryState memory; // from which the next shape is sought
   SolidStaticCounts counts;
 
-  static SolidMotionOptions options(SolidLaw law) {
-    SolidMotionOptions options;
+  static integrator::SolidMotionOptions options(integrator::SolidLaw law) {
+    integrator::SolidMotionOptions options;
     options.law = law;
     options.tolerance = tolerance_at_rest;
     options.max_rounds = max_rounds;
@@ -92,15 +92,16 @@ struct SolidStatic::State {
     return options;
   }
 
-  State(const Model& m, SolidLaw l, const Context& c)
-      : model(m), context(c), law(l), engine(element_mesh(m), element_materials(m), options(l), c),
+  State(const model::Model& m, integrator::SolidLaw l, const Context& c)
+      : model(m), context(c), law(l),
+        engine(fem::element_mesh(m), fem::element_materials(m), options(l), c),
         typical(contact::typical_contact(m)) {
-    for (const Node& node : m.nodes)
+    for (const model::Node& node : m.nodes)
       rest.insert(rest.end(), {node.position.x, node.position.y, node.position.z});
     if (is_viscoelastic(m))
       shortest = HUGE_VAL;
-    for (const Material& material : m.materials)
-      for (const PronyTerm& term : material.prony)
+    for (const model::Material& material : m.materials)
+      for (const model::PronyTerm& term : material.prony)
         shortest = std::min(shortest, term.time);
   }
 
@@ -109,9 +110,9 @@ struct SolidStatic::State {
   // ---- loads
 
   /// Forces on the 3 n axes but those that follow.
-  std::vector<double> dead_forces(const Load& load) {
+  std::vector<double> dead_forces(const contact::Load& load) {
     if (weighed != load.gravity) {
-      weight = weight_of(model, load.gravity);
+      weight = fem::weight_of(model, load.gravity);
       weighed = load.gravity;
     }
     std::vector<double> all = weight;
@@ -122,25 +123,26 @@ struct SolidStatic::State {
   }
 
   /// All of them, with nodes at these places.
-  std::vector<double> forces(const Load& load, std::span<const double> places) {
+  std::vector<double> forces(const contact::Load& load, std::span<const double> places) {
     std::vector<double> all = dead_forces(load);
     const auto add = [&](std::uint32_t node, const Vec3& force) {
       for (int a = 0; a < 3; ++a)
         all[axis_of(node, a)] += force[a];
     };
     if (!load.pressure.empty())
-      press(
-          pressed_corners(load, model), 0,
+      contact::press(
+          contact::pressed_corners(load, model), 0,
           [&](std::uint32_t node) { return vector_at(places, node); }, add);
     return all;
   }
 
   /// Holds what the model and the load hold.
-  void hold(const Load& load) {
+  void hold(const contact::Load& load) {
     std::vector<std::uint8_t> now(3 * model.nodes.size());
     for (std::uint32_t i = 0; i < model.nodes.size(); ++i)
       for (int a = 0; a < 3; ++a)
-        now[axis_of(i, a)] = is_fixed(model, i, a) || load.displacement.contains(i) ? 1 : 0;
+        now[axis_of(i, a)] =
+            contact::is_fixed(model, i, a) || load.displacement.contains(i) ? 1 : 0;
     if (now != held) {
       engine.hold(now);
       held = std::move(now);
@@ -156,30 +158,30 @@ struct SolidStatic::State {
   /// \throw SingularStiffness
   void require_held() {
     try {
-      if (engine.condition(context) <= max_condition)
+      if (engine.condition(context) <= linalg::max_condition)
         return;
-    } catch (const NotPositiveDefinite&) {
+    } catch (const linalg::NotPositiveDefinite&) {
       // Named below.
     }
-    StiffnessCheck check;
-    const TetMesh mesh = element_mesh(model);
-    (void)checked_factor(model,
-                         solid_stiffness(mesh,
-                                         solid_elements(mesh, element_materials(model), context),
-                                         held, context),
-                         context, check);
-    throw SingularStiffness("the model is free to move, expected more nodes that are held");
+    linalg::StiffnessCheck check;
+    const tetrahedra::TetMesh mesh = fem::element_mesh(model);
+    (void)linalg::checked_factor(
+        model,
+        fem::solid_stiffness(
+            mesh, fem::solid_elements(mesh, fem::element_materials(model), context), held, context),
+        context, check);
+    throw linalg::SingularStiffness("the model is free to move, expected more nodes that are held");
   }
 
-  std::vector<double> targets(const Load& load) const {
+  std::vector<double> targets(const contact::Load& load) const {
     std::vector<double> all(rest.size());
     for (const auto& [node, u] : load.displacement)
       for (int a = 0; a < 3; ++a)
-        all[axis_of(node, a)] = is_fixed(model, node, a) ? 0 : u[a];
+        all[axis_of(node, a)] = contact::is_fixed(model, node, a) ? 0 : u[a];
     return all;
   }
 
-  void begin(const Load& load, std::span<const double> places) {
+  void begin(const contact::Load& load, std::span<const double> places) {
     hold(load);
     if (shortest > 0)
       engine.set_memory(memory);
@@ -194,8 +196,8 @@ struct SolidStatic::State {
   /// Whether too much of the volume is inside out: a minimum of another kind than tissue has.
   bool is_inside_out() const {
     const auto volume = [](std::span<const double> x, const Tetrahedron& t) {
-      return tetrahedron_volume(vector_at(x, t[0]), vector_at(x, t[1]), vector_at(x, t[2]),
-                                vector_at(x, t[3]));
+      return tetrahedra::tetrahedron_volume(vector_at(x, t[0]), vector_at(x, t[1]),
+                                            vector_at(x, t[2]), vector_at(x, t[3]));
     };
     double all = 0, turned = 0;
     for (const Tetrahedron& t : model.tetrahedra) {
@@ -207,16 +209,16 @@ struct SolidStatic::State {
   }
 
   bool settle(double elapsed = 0) {
-    const SolidStep step = engine.settle(context, elapsed);
+    const integrator::SolidStep step = engine.settle(context, elapsed);
     counts.rounds += static_cast<std::uint64_t>(step.rounds);
     counts.factors += static_cast<std::uint64_t>(step.factorisations);
     return step.left <= tolerance_at_rest;
   }
 
   /// The same forces of pressures as forces() has.
-  std::vector<FollowingForce> following(const Load& load) const {
-    std::vector<FollowingForce> all;
-    for (const PressedCorner& c : pressed_corners(load, model))
+  std::vector<integrator::FollowingForce> following(const contact::Load& load) const {
+    std::vector<integrator::FollowingForce> all;
+    for (const contact::PressedCorner& c : contact::pressed_corners(load, model))
       for (std::uint32_t k = 0; k < c.count; ++k)
         all.push_back({.node = c.bearers[k],
                        .triangle = c.triangle,
@@ -225,7 +227,8 @@ struct SolidStatic::State {
   }
 
   /// As find, of hyperelastic elements: pressures are those of each round's shape.
-  bool find_hyperelastic(const Load& load, std::span<const double> places, double elapsed) {
+  bool find_hyperelastic(const contact::Load& load, std::span<const double> places,
+                         double elapsed) {
     begin(load, places);
     engine.set_load(dead_forces(load));
     engine.follow(following(load));
@@ -239,8 +242,8 @@ struct SolidStatic::State {
   }
 
   /// From places to the shape under a load. \return whether it was found
-  bool find(const Load& load, std::span<const double> places, double elapsed = 0) {
-    if (law == SolidLaw::hyperelastic)
+  bool find(const contact::Load& load, std::span<const double> places, double elapsed = 0) {
+    if (law == integrator::SolidLaw::hyperelastic)
       return find_hyperelastic(load, places, elapsed);
     begin(load, places);
     if (!settle())
@@ -286,7 +289,7 @@ struct SolidStatic::State {
     return false;
   }
 
-  void update(const Load& load, const RestTime& time) {
+  void update(const contact::Load& load, const RestTime& time) {
     ++counts.updates;
     const bool same = answer && answer->balanced && answer->load == load;
     if (shortest > 0) {
@@ -300,8 +303,8 @@ struct SolidStatic::State {
   }
 
   /// To the shape under a load, at once.
-  void change(const Load& load) {
-    const Load from = answer ? answer->load : Load{};
+  void change(const contact::Load& load) {
+    const contact::Load from = answer ? answer->load : contact::Load{};
     const std::vector<double> stood = start();
     // What nothing loads is as it was at rest.
     std::vector<double> places = load.empty() ? rest : stood;
@@ -318,14 +321,14 @@ struct SolidStatic::State {
       part /= 4;
       if (part < least_part)
         throw Error("no shape at rest is found beyond " +
-                    number_text(std::round(1000 * done) / 10) +
+                    text::number_text(std::round(1000 * done) / 10) +
                     " % of the way to this load, expected a smaller one, or more steps");
     }
     set(load);
   }
 
   /// A viscoelastic solid on its way through this time.
-  void pass(const Load& load, const RestTime& time, bool same) {
+  void pass(const contact::Load& load, const RestTime& time, bool same) {
     RestTime span = time;
     if (answer)
       span.start = answer->time;
@@ -335,9 +338,9 @@ struct SolidStatic::State {
       ++counts.unchanged;
       return;
     }
-    memory = answer ? answer->memory : MemoryState{};
+    memory = answer ? answer->memory : viscous::MemoryState{};
     if (!same && span.gradual && duration > 0) {
-      const Load from = answer ? answer->load : Load{};
+      const contact::Load from = answer ? answer->load : contact::Load{};
       const std::vector<double> stood = start();
       const double least = std::max(gradual_step * shortest, duration / most_gradual),
                    count = std::ceil(duration / std::min(least, gradual_part * duration));
@@ -366,15 +369,15 @@ struct SolidStatic::State {
     set(load, false, span.end, since);
   }
 
-  void relax(const Load& load, std::span<const double> places, double elapsed, double at) {
+  void relax(const contact::Load& load, std::span<const double> places, double elapsed, double at) {
     if (!find(load, places, elapsed))
-      throw Error("no shape at rest is found of what has relaxed until " + number_text(at) +
+      throw Error("no shape at rest is found of what has relaxed until " + text::number_text(at) +
                   " s, expected a smaller load, or more steps");
     memory = engine.memory();
   }
 
   /// The engine's state is the answer.
-  void set(const Load& load, bool sharp = false, double time = 0, double since = 0) {
+  void set(const contact::Load& load, bool sharp = false, double time = 0, double since = 0) {
     auto next = std::make_shared<SolidRest>();
     next->load = load;
     next->sharp = sharp;
@@ -395,13 +398,14 @@ struct SolidStatic::State {
 
   // ---- contact
 
-  contact::ContactBody& begin_contact(const Load& load, std::vector<contact::VertexForce> last,
+  contact::ContactBody& begin_contact(const contact::Load& load,
+                                      std::vector<contact::VertexForce> last,
                                       const RestTime& time) {
     acting = load;
     acting_time = time;
     if (answer)
       acting_time.start = answer->time;
-    memory = answer ? answer->memory : MemoryState{};
+    memory = answer ? answer->memory : viscous::MemoryState{};
     begin(load, start());
     engine.begin_step(HUGE_VAL, context, std::max(0.0, acting_time.end - acting_time.start));
     if (answer && answer->sharp)
@@ -425,7 +429,7 @@ struct SolidStatic::State {
       if (held[axis] != 0)
         touching[axis] = 0;
     const bool sharp = engine.is_sharp();
-    const SolidStep step = engine.end_step(touching, context);
+    const integrator::SolidStep step = engine.end_step(touching, context);
     counts.rounds += static_cast<std::uint64_t>(step.rounds);
     counts.factors += static_cast<std::uint64_t>(step.factorisations);
     for (std::uint32_t node = 0; node < model.nodes.size(); ++node)
@@ -435,16 +439,17 @@ struct SolidStatic::State {
   }
 };
 
-SolidStatic::SolidStatic(const Model& model, SolidLaw law, const Context& context)
+SolidStatic::SolidStatic(const model::Model& model, integrator::SolidLaw law,
+                         const Context& context)
     : state_(std::make_unique<State>(model, law, context)) {}
 SolidStatic::~SolidStatic() = default;
 SolidStatic::SolidStatic(SolidStatic&&) noexcept = default;
 
-void SolidStatic::update(const Load& load, const RestTime& time) {
+void SolidStatic::update(const contact::Load& load, const RestTime& time) {
   state_->update(load, time);
 }
 
-void SolidStatic::prepare(const Load& load) {
+void SolidStatic::prepare(const contact::Load& load) {
   state_->hold(load);
 }
 
@@ -469,26 +474,26 @@ std::span<const double> SolidStatic::displacement() {
     s.displacement[axis] = s.answer->places[axis] - s.rest[axis];
   for (const auto& [node, u] : s.answer->load.displacement)
     for (int a = 0; a < 3; ++a)
-      s.displacement[axis_of(node, a)] = is_fixed(s.model, node, a) ? 0 : u[a];
+      s.displacement[axis_of(node, a)] = contact::is_fixed(s.model, node, a) ? 0 : u[a];
   return s.displacement;
 }
 
-std::vector<NodeVector> SolidStatic::holding_forces() const {
-  std::vector<NodeVector> forces;
+std::vector<contact::NodeVector> SolidStatic::holding_forces() const {
+  std::vector<contact::NodeVector> forces;
   const State& s = *state_;
   if (!s.answer || s.answer->reactions.empty())
     return forces;
   for (const auto& entry : s.answer->load.displacement) {
-    NodeVector force{entry.first, {}};
+    contact::NodeVector force{entry.first, {}};
     for (int a = 0; a < 3; ++a)
-      if (!is_fixed(s.model, entry.first, a))
+      if (!contact::is_fixed(s.model, entry.first, a))
         force.value[a] = s.answer->reactions[axis_of(entry.first, a)];
     forces.push_back(force);
   }
   return forces;
 }
 
-contact::ContactBody& SolidStatic::begin_contact(const Load& load,
+contact::ContactBody& SolidStatic::begin_contact(const contact::Load& load,
                                                  std::vector<contact::VertexForce> last,
                                                  const RestTime& time) {
   return state_->begin_contact(load, std::move(last), time);
@@ -502,4 +507,4 @@ SolidStaticCounts SolidStatic::counts() const noexcept {
   return state_->counts;
 }
 
-} // namespace gewebe
+} // namespace gewebe::dynamics

@@ -32,17 +32,17 @@
 #include <span>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::dynamics {
 
 /// Shape of a solid at rest.
 struct SolidRest {
-  Load load;                     ///< that it balances, with contact forces
+  contact::Load load;            ///< that it balances, with contact forces
   std::vector<double> places;    ///< of all nodes, 3 n, mm
   std::vector<double> reactions; ///< on held axes, 3 n, else 0
   bool balanced = true;          ///< else only the start of the next one, as behind a cut
   bool sharp = false;            ///< contact took a tangent: the next one begins with its own
   // Of a viscoelastic solid:
-  MemoryState memory{};
+  viscous::MemoryState memory{};
   double time = 0;  ///< s, of this shape
   double since = 0; ///< ... and of the last change of its load
 };
@@ -64,7 +64,7 @@ public:
   /// Keeps a reference to the model.
   /// \pre check_model(model) passes, the model has tetrahedra, and no springs beside them
   /// \throw Error as SolidMotion
-  SolidStatic(const Model& model, SolidLaw law, const Context& context);
+  SolidStatic(const model::Model& model, integrator::SolidLaw law, const Context& context);
   ~SolidStatic();
   SolidStatic(SolidStatic&&) noexcept;
 
@@ -74,9 +74,9 @@ public:
   /// to move \throw Error if no shape is found, with the share of the way to the load that was;
   /// Cancelled
   /// \param time  of a viscoelastic solid
-  void update(const Load& load, const RestTime& time = {});
+  void update(const contact::Load& load, const RestTime& time = {});
   /// Makes what the first update under this load needs. \throw as update
-  void prepare(const Load& load);
+  void prepare(const contact::Load& load);
   std::shared_ptr<const SolidRest> answer() const noexcept;
   /// Rolls back to an earlier answer; null: to none.
   void restore(std::shared_ptr<const SolidRest> answer);
@@ -84,14 +84,15 @@ public:
   /// Displacement of all nodes, 3 n, mm. Displaced nodes have exactly their displacements.
   std::span<const double> displacement();
   /// Reactions of the displaced nodes, by ascending node; contact forces there included.
-  std::vector<NodeVector> holding_forces() const;
+  std::vector<contact::NodeVector> holding_forces() const;
 
   /// Begins a step with contact, from the last answer to the shape under this load. A step that was
   /// begun is abandoned. Vertices are those of contact::model_surface.
   /// \param last  contact forces at its beginning \return valid until the next step
   /// \throw as update
   /// \param time  at the end of the step, of a viscoelastic solid
-  contact::ContactBody& begin_contact(const Load& load, std::vector<contact::VertexForce> last,
+  contact::ContactBody& begin_contact(const contact::Load& load,
+                                      std::vector<contact::VertexForce> last,
                                       const RestTime& time = {});
   /// Ends it: the answer is where contact has moved the body to.
   void end_contact();
@@ -103,4 +104,4 @@ private:
   std::unique_ptr<State> state_;
 };
 
-} // namespace gewebe
+} // namespace gewebe::dynamics

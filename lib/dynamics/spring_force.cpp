@@ -6,19 +6,19 @@
 #include <cmath>
 #include <string>
 
-namespace gewebe {
+namespace gewebe::dynamics {
 
-SpringNetwork spring_network(const Model& model) {
+SpringNetwork spring_network(const model::Model& model) {
   const std::size_t n = model.nodes.size();
   SpringNetwork network;
   network.position.reserve(n);
   network.drag.reserve(n);
-  for (const Node& node : model.nodes) {
+  for (const model::Node& node : model.nodes) {
     network.position.push_back(node.position);
     network.drag.push_back(node.drag);
   }
   network.first.assign(n + 1, 0);
-  for (const Spring& s : model.springs) {
+  for (const model::Spring& s : model.springs) {
     ++network.first[s.i + std::size_t{1}];
     ++network.first[s.j + std::size_t{1}];
   }
@@ -26,16 +26,17 @@ SpringNetwork spring_network(const Model& model) {
     network.first[i + 1] += network.first[i];
   network.halves.resize(network.first[n]);
   std::vector<std::size_t> next(network.first.begin(), network.first.end() - 1);
-  for (const Spring& s : model.springs) {
+  for (const model::Spring& s : model.springs) {
     network.halves[next[s.i]++] = {s.j, s.stiffness, s.damping, s.rest};
     network.halves[next[s.j]++] = {s.i, s.stiffness, s.damping, s.rest};
   }
   return network;
 }
 
-void require_masses(const Model& model) {
+void require_masses(const model::Model& model) {
   for (std::size_t i = 0; i < model.nodes.size(); ++i)
-    if (const Node& node = model.nodes[i]; node.fixed != fixed_all && !(node.mass > 0))
+    if (const model::Node& node = model.nodes[i];
+        node.fixed != model::fixed_all && !(node.mass > 0))
       throw Error("node " + std::to_string(i) +
                   " can move but has no mass, expected more than 0 g");
 }
@@ -61,16 +62,16 @@ Vec3 spring_force(const SpringNetwork& network, std::span<const NodeMotion> moti
   return force - network.drag[i] * own.velocity;
 }
 
-double kinetic_energy(const Model& model, std::span<const NodeMotion> motion) {
+double kinetic_energy(const model::Model& model, std::span<const NodeMotion> motion) {
   double sum = 0;
   for (std::size_t i = 0; i < motion.size(); ++i)
     sum += model.nodes[i].mass * dot(motion[i].velocity, motion[i].velocity) / 2;
   return sum;
 }
 
-double elastic_energy(const Model& model, std::span<const NodeMotion> motion) {
+double elastic_energy(const model::Model& model, std::span<const NodeMotion> motion) {
   double sum = 0;
-  for (const Spring& s : model.springs) {
+  for (const model::Spring& s : model.springs) {
     const Vec3 along = (model.nodes[s.j].position - model.nodes[s.i].position) +
                        (motion[s.j].displacement - motion[s.i].displacement);
     const double extension = norm(along) - s.rest;
@@ -79,11 +80,11 @@ double elastic_energy(const Model& model, std::span<const NodeMotion> motion) {
   return sum;
 }
 
-Vec3 momentum(const Model& model, std::span<const NodeMotion> motion) {
+Vec3 momentum(const model::Model& model, std::span<const NodeMotion> motion) {
   Vec3 sum;
   for (std::size_t i = 0; i < motion.size(); ++i)
     sum += model.nodes[i].mass * motion[i].velocity;
   return sum;
 }
 
-} // namespace gewebe
+} // namespace gewebe::dynamics

@@ -13,7 +13,7 @@
 #include <span>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::dynamics {
 
 /// Displacement from rest (mm) and velocity (mm/s) of a node. Displacements instead of positions
 /// keep the digits of small deformations far from the origin.
@@ -35,19 +35,19 @@ struct SpringNetwork {
 };
 
 /// \pre check_model(model) passes
-SpringNetwork spring_network(const Model& model);
+SpringNetwork spring_network(const model::Model& model);
 
 /// \throw Error that names the first node that can move and has no mass
-void require_masses(const Model& model);
+void require_masses(const model::Model& model);
 
 /// Force of springs and drag on node i. \pre as many motions as nodes
 Vec3 spring_force(const SpringNetwork& network, std::span<const NodeMotion> motion, std::size_t i);
 
 /// Σ m v²/2 and Σ k e²/2, in g mm²/s² = 1e-9 J.
-double kinetic_energy(const Model& model, std::span<const NodeMotion> motion);
-double elastic_energy(const Model& model, std::span<const NodeMotion> motion);
+double kinetic_energy(const model::Model& model, std::span<const NodeMotion> motion);
+double elastic_energy(const model::Model& model, std::span<const NodeMotion> motion);
 
 /// Σ m v, in g mm/s.
-Vec3 momentum(const Model& model, std::span<const NodeMotion> motion);
+Vec3 momentum(const model::Model& model, std::span<const NodeMotion> motion);
 
-} // namespace gewebe
+} // namespace gewebe::dynamics

@@ -6,7 +6,7 @@
 #include <cstddef>
 #include <cstdint>
 
-namespace gewebe {
+namespace gewebe::dynamics {
 
 /// A node's displacement from rest (mm) and velocity (mm/s) in one cache line; the fourth numbers
 /// are 0.
@@ -58,4 +58,4 @@ bool block_step_baseline(const SpringBlock& block, const NodeRest* rest, const N
 bool block_step_avx2(const SpringBlock& block, const NodeRest* rest, const NodeTraits* traits,
                      const NodeRow* now, NodeRow* next, double h);
 
-} // namespace gewebe
+} // namespace gewebe::dynamics

@@ -5,7 +5,7 @@
 
 #include <immintrin.h>
 
-namespace gewebe {
+namespace gewebe::dynamics {
 namespace {
 
 using Four = double __attribute__((vector_size(32), may_alias));
@@ -170,4 +170,4 @@ inline bool step(const SpringBlock& block, const NodeRest* rest, const NodeTrait
 }
 
 } // namespace
-} // namespace gewebe
+} // namespace gewebe::dynamics

@@ -6,14 +6,14 @@
 #include <span>
 #include <utility>
 
-namespace gewebe {
+namespace gewebe::dynamics {
 
 namespace {
 
 constexpr std::size_t lanes = 4;
 
 /// Sorts nodes so that every half is on one side of a plane; leaves are blocks.
-void bisect(const Model& model, std::span<std::uint32_t> nodes, std::size_t first,
+void bisect(const model::Model& model, std::span<std::uint32_t> nodes, std::size_t first,
             std::vector<std::pair<std::size_t, std::size_t>>& blocks) {
   if (nodes.size() <= 1) {
     if (blocks.empty() && !nodes.empty())
@@ -45,7 +45,7 @@ std::uint32_t bytes(std::uint32_t row) {
 
 struct Half {
   std::uint32_t i, j; ///< rows
-  const Spring* spring;
+  const model::Spring* spring;
 };
 
 /// Groups of springs in rounds in which no node comes twice: a sum that waits for the one before
@@ -93,14 +93,14 @@ std::uint64_t SpringLayout::pulls() const {
   return lanes * groups.size();
 }
 
-SpringLayout spring_layout(const Model& model) {
+SpringLayout spring_layout(const model::Model& model) {
   SpringLayout layout;
   const std::size_t n = model.nodes.size();
   layout.node_of_row.resize(n);
   std::iota(layout.node_of_row.begin(), layout.node_of_row.end(), 0U);
   const auto held = std::stable_partition(
       layout.node_of_row.begin(), layout.node_of_row.end(),
-      [&](std::uint32_t node) { return model.nodes[node].fixed != fixed_all; });
+      [&](std::uint32_t node) { return model.nodes[node].fixed != model::fixed_all; });
   layout.movable = static_cast<std::size_t>(held - layout.node_of_row.begin());
   std::vector<std::pair<std::size_t, std::size_t>> ranges;
   bisect(model, {layout.node_of_row.data(), layout.movable}, 0, ranges);
@@ -119,7 +119,7 @@ SpringLayout spring_layout(const Model& model) {
       block_of_row[row] = b;
 
   std::vector<std::vector<Half>> within(ranges.size()), across(ranges.size());
-  for (const Spring& s : model.springs) {
+  for (const model::Spring& s : model.springs) {
     const std::uint32_t i = layout.row_of_node[s.i], j = layout.row_of_node[s.j];
     const bool i_moves = i < layout.movable, j_moves = j < layout.movable;
     if (i_moves && j_moves && block_of_row[i] == block_of_row[j]) {
@@ -147,4 +147,4 @@ SpringLayout spring_layout(const Model& model) {
   return layout;
 }
 
-} // namespace gewebe
+} // namespace gewebe::dynamics

@@ -11,7 +11,7 @@
 #include <cstdint>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::dynamics {
 
 struct SpringLayout {
   std::vector<std::uint32_t> node_of_row; ///< movable nodes, block by block, then the others
@@ -32,6 +32,6 @@ struct SpringLayout {
 
 /// Forms blocks by recursive bisection of the rest positions along the longest side. The result is
 /// the same on every machine. \pre check_model(model) passes
-SpringLayout spring_layout(const Model& model);
+SpringLayout spring_layout(const model::Model& model);
 
-} // namespace gewebe
+} // namespace gewebe::dynamics

@@ -16,22 +16,22 @@
 #include <utility>
 #include <vector>
 
-namespace gewebe::elements {
+namespace gewebe::embedding::elements {
 
 using Corners = std::array<Vec3, 4>;
 using Barycentric = std::array<double, 4>;
 
-inline Corners corners_of(const Model& model, std::uint32_t tetrahedron) {
+inline Corners corners_of(const model::Model& model, std::uint32_t tetrahedron) {
   const Tetrahedron& t = model.tetrahedra[tetrahedron];
   return {model.nodes[t[0]].position, model.nodes[t[1]].position, model.nodes[t[2]].position,
           model.nodes[t[3]].position};
 }
 
 inline Barycentric barycentric(const Corners& c, const Vec3& x) {
-  const double whole = tetrahedron_volume(c[0], c[1], c[2], c[3]);
-  Barycentric l{0, tetrahedron_volume(c[0], x, c[2], c[3]) / whole,
-                tetrahedron_volume(c[0], c[1], x, c[3]) / whole,
-                tetrahedron_volume(c[0], c[1], c[2], x) / whole};
+  const double whole = tetrahedra::tetrahedron_volume(c[0], c[1], c[2], c[3]);
+  Barycentric l{0, tetrahedra::tetrahedron_volume(c[0], x, c[2], c[3]) / whole,
+                tetrahedra::tetrahedron_volume(c[0], c[1], x, c[3]) / whole,
+                tetrahedra::tetrahedron_volume(c[0], c[1], c[2], x) / whole};
   l[0] = 1 - l[1] - l[2] - l[3];
   return l;
 }
@@ -46,8 +46,8 @@ inline Vec3 nearest_in(const Corners& c, const Vec3& x) {
     return x;
   Vec3 nearest = c[0];
   double least = HUGE_VAL;
-  for (const auto& [i, j, k] : tetrahedron_faces) {
-    const Vec3 q = nearest_on_triangle(x, c[i], c[j], c[k]).point;
+  for (const auto& [i, j, k] : tetrahedra::tetrahedron_faces) {
+    const Vec3 q = mesh::nearest_on_triangle(x, c[i], c[j], c[k]).point;
     if (const double squared = dot(x - q, x - q); squared < least) {
       least = squared;
       nearest = q;
@@ -59,7 +59,7 @@ inline Vec3 nearest_in(const Corners& c, const Vec3& x) {
 /// Hierarchy of elements, for the nearest one.
 class ElementBoxes {
 public:
-  ElementBoxes(const Model& model, std::span<const std::uint32_t> elements)
+  ElementBoxes(const model::Model& model, std::span<const std::uint32_t> elements)
       : model_(model), elements_(elements.begin(), elements.end()) {
     std::ranges::sort(elements_); // of equally near ones the first is returned
     std::vector<Box3> boxes(elements_.size());
@@ -93,9 +93,9 @@ public:
   }
 
 private:
-  const Model& model_;
+  const model::Model& model_;
   std::vector<std::uint32_t> elements_;
   collision::Bvh tree_;
 };
 
-} // namespace gewebe::elements
+} // namespace gewebe::embedding::elements

@@ -12,17 +12,17 @@
 #include <tuple>
 #include <utility>
 
-namespace gewebe {
+namespace gewebe::embedding {
 namespace {
 
 using namespace elements;
 
 } // namespace
 
-SkinWeights skin_weights(const Model& model) {
+SkinWeights skin_weights(const model::Model& model) {
   SkinWeights all;
   all.nodes = model.middles.empty() ? 4 : 10;
-  const Skin& skin = model.skin;
+  const model::Skin& skin = model.skin;
   all.node.reserve(all.nodes * skin.points.size());
   all.weight.reserve(all.nodes * skin.points.size());
   for (std::size_t p = 0; p < skin.points.size(); ++p) {
@@ -42,7 +42,7 @@ SkinWeights skin_weights(const Model& model) {
     all.node.insert(all.node.end(), model.middles[t].begin(), model.middles[t].end());
     for (std::size_t a = 0; a < 4; ++a)
       all.weight.push_back(l[a] * (2 * l[a] - 1) + (4 * l[a] - 1) * d[a]);
-    for (const auto& [a, b] : tetrahedron_edges)
+    for (const auto& [a, b] : tetrahedra::tetrahedron_edges)
       all.weight.push_back(4 * l[a] * l[b] + 4 * (l[a] * d[b] + l[b] * d[a]));
   }
   return all;
@@ -59,10 +59,10 @@ std::vector<Vec3> displaced_skin(const SkinWeights& weights, std::span<const Vec
   return points;
 }
 
-SkinReport add_skin(Model& model, const TriangleMesh& surface,
+SkinReport add_skin(model::Model& model, const TriangleMesh& surface,
                     std::span<const std::int32_t> material, const Context& context) {
   SkinReport report;
-  Skin skin;
+  model::Skin skin;
   std::vector<std::uint32_t> number(surface.points.size(), UINT32_MAX);
   for (std::size_t t = 0; t < surface.triangles.size(); ++t) {
     const auto& [a, b, c] = surface.triangles[t];
@@ -76,7 +76,7 @@ SkinReport add_skin(Model& model, const TriangleMesh& surface,
     skin.material.push_back(material.empty() ? 0 : material[t]);
     if (!surface.texcoords.empty())
       std::ranges::transform(surface.texcoords[t], skin.texcoords.emplace_back().begin(),
-                             [](float value) { return decimal_of(value); });
+                             [](float value) { return text::decimal_of(value); });
   }
   if (skin.triangles.empty())
     throw Error("the surface has no triangle of three different points, expected some");
@@ -110,4 +110,4 @@ SkinReport add_skin(Model& model, const TriangleMesh& surface,
   return report;
 }
 
-} // namespace gewebe
+} // namespace gewebe::embedding

@@ -23,7 +23,7 @@
 #include <span>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::embedding {
 
 /// How the points of a skin follow nodes.
 struct SkinWeights {
@@ -32,7 +32,7 @@ struct SkinWeights {
   std::vector<double> weight;      ///< as many; those of a point sum to 1
 };
 /// Of a model's skin, none where it has none. \pre check_model(model) passes
-SkinWeights skin_weights(const Model& model);
+SkinWeights skin_weights(const model::Model& model);
 
 /// Where points of a skin are. \param rest of the skin \param displacement of the model's nodes,
 /// x, y, z of each \pre all nodes of `weights` are among them
@@ -49,7 +49,7 @@ struct SkinReport {
 /// nearest element, the first of several. \param material of each triangle; empty: 0
 /// \pre check_mesh(surface) passes, the model has tetrahedra and the materials
 /// \throw Error if no triangle is left; Cancelled
-SkinReport add_skin(Model& model, const TriangleMesh& surface,
+SkinReport add_skin(model::Model& model, const TriangleMesh& surface,
                     std::span<const std::int32_t> material, const Context& context);
 
-} // namespace gewebe
+} // namespace gewebe::embedding

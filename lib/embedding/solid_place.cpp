@@ -6,7 +6,7 @@
 #include <algorithm>
 #include <cmath>
 
-namespace gewebe {
+namespace gewebe::embedding {
 
 namespace {
 
@@ -19,17 +19,17 @@ struct Nearest {
   std::array<Vec3, 4> gradient{}; ///< of the barycentric coordinates
 };
 
-Nearest nearest_of(const TetMesh& mesh, std::size_t t, const Vec3& place) {
+Nearest nearest_of(const tetrahedra::TetMesh& mesh, std::size_t t, const Vec3& place) {
   const Tetrahedron& tet = mesh.tetrahedra[t];
   std::array<Vec3, 4> corner;
   for (std::size_t k = 0; k < 4; ++k)
     corner[k] = mesh.points[tet[k]];
-  const double six = 6 * tetrahedron_volume(corner[0], corner[1], corner[2], corner[3]);
+  const double six = 6 * tetrahedra::tetrahedron_volume(corner[0], corner[1], corner[2], corner[3]);
   Nearest found;
   found.element = t;
   bool inside = true;
   for (std::size_t k = 0; k < 4; ++k) {
-    const auto& face = tetrahedron_faces[k];
+    const auto& face = tetrahedra::tetrahedron_faces[k];
     const Vec3 &a = corner[face[0]], &b = corner[face[1]], &c = corner[face[2]];
     found.gradient[k] = cross(c - a, b - a) / six; // inwards
     found.at[k] = dot(found.gradient[k], place - a);
@@ -40,14 +40,16 @@ Nearest nearest_of(const TetMesh& mesh, std::size_t t, const Vec3& place) {
     return found;
   }
   for (std::size_t k = 0; k < 4; ++k) {
-    const auto& face = tetrahedron_faces[k];
+    const auto& face = tetrahedra::tetrahedron_faces[k];
     const Vec3 there =
-        nearest_on_triangle(place, corner[face[0]], corner[face[1]], corner[face[2]]).point;
+        mesh::nearest_on_triangle(place, corner[face[0]], corner[face[1]], corner[face[2]]).point;
     const double distance = norm(place - there);
     if (distance < found.distance) {
       found.distance = distance;
       for (std::size_t c = 0; c < 4; ++c)
-        found.at[c] = c == k ? 0 : dot(found.gradient[c], there - corner[tetrahedron_faces[c][0]]);
+        found.at[c] =
+            c == k ? 0
+                   : dot(found.gradient[c], there - corner[tetrahedra::tetrahedron_faces[c][0]]);
     }
   }
   return found;
@@ -55,7 +57,7 @@ Nearest nearest_of(const TetMesh& mesh, std::size_t t, const Vec3& place) {
 
 } // namespace
 
-SolidPlace find_place(const TetMesh& mesh, const Vec3& place) {
+SolidPlace find_place(const tetrahedra::TetMesh& mesh, const Vec3& place) {
   Nearest nearest;
   for (std::size_t t = 0; t < mesh.tetrahedra.size() && nearest.distance > 0; ++t) {
     // The circle around it is far cheaper than its faces.
@@ -76,20 +78,20 @@ SolidPlace find_place(const TetMesh& mesh, const Vec3& place) {
     foot = foot + nearest.at[k] * mesh.points[tet[k]];
   const Vec3 off = place - foot;
   SolidPlace result;
-  result.count = solid_nodes(mesh);
+  result.count = fem::solid_nodes(mesh);
   result.outside = nearest.distance;
   Barycentric slope{}; // of each coordinate along `off`
   for (std::size_t k = 0; k < 4; ++k)
     slope[k] = dot(nearest.gradient[k], off);
   for (std::size_t a = 0; a < result.count; ++a) {
-    result.node[a] = solid_node(mesh, nearest.element, a);
+    result.node[a] = fem::solid_node(mesh, nearest.element, a);
     const Barycentric& l = nearest.at;
     if (result.count == 4) {
       result.weight[a] = l[a] + slope[a];
     } else if (a < 4) {
       result.weight[a] = l[a] * (2 * l[a] - 1) + (4 * l[a] - 1) * slope[a];
     } else {
-      const auto [i, j] = tetrahedron_edges[a - 4];
+      const auto [i, j] = tetrahedra::tetrahedron_edges[a - 4];
       result.weight[a] = 4 * l[i] * l[j] + 4 * (l[i] * slope[j] + l[j] * slope[i]);
     }
   }
@@ -104,4 +106,4 @@ Vec3 displacement_at(const SolidPlace& place, std::span<const double> u) {
   return sum;
 }
 
-} // namespace gewebe
+} // namespace gewebe::embedding

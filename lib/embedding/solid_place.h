@@ -9,7 +9,7 @@
 #include <cstdint>
 #include <span>
 
-namespace gewebe {
+namespace gewebe::embedding {
 
 /// u(place) = Σ weight u(node) over the first `count`.
 struct SolidPlace {
@@ -22,9 +22,9 @@ struct SolidPlace {
 /// Of a place in a tetrahedron by its shape functions, bubbles left out; outside of all of them it
 /// is carried by the nearest one, as its gradient there has it: what stands off a surface turns
 /// with it. Looks at all elements. \pre mesh has tetrahedra of positive volume
-SolidPlace find_place(const TetMesh& mesh, const Vec3& place);
+SolidPlace find_place(const tetrahedra::TetMesh& mesh, const Vec3& place);
 
 /// \pre u.size() == 3 n
 Vec3 displacement_at(const SolidPlace& place, std::span<const double> u);
 
-} // namespace gewebe
+} // namespace gewebe::embedding

@@ -8,18 +8,19 @@
 #include <cmath>
 #include <string>
 
-namespace gewebe {
+namespace gewebe::fem {
 
 namespace {
 
 /// Of edges' lengths, that middles may stand away from the middle.
 constexpr double straight = 1e-3;
 
-std::size_t material_of(const TetMesh& mesh, std::size_t t) {
+std::size_t material_of(const tetrahedra::TetMesh& mesh, std::size_t t) {
   return mesh.material.empty() ? 0 : static_cast<std::size_t>(mesh.material[t]);
 }
 
-SolidBlock block(const TetMesh& mesh, const SolidElement& e, std::size_t a, std::size_t b) {
+SolidBlock block(const tetrahedra::TetMesh& mesh, const SolidElement& e, std::size_t a,
+                 std::size_t b) {
   return mesh.middles.empty() ? linear_block(e, a, b) : quadratic_block(e, a, b);
 }
 
@@ -29,7 +30,7 @@ struct Uses {
   std::vector<std::size_t> at;
 };
 
-Uses uses_of(const TetMesh& mesh) {
+Uses uses_of(const tetrahedra::TetMesh& mesh) {
   const std::size_t count = solid_nodes(mesh);
   Uses uses;
   uses.start.resize(mesh.points.size() + 1);
@@ -47,7 +48,7 @@ Uses uses_of(const TetMesh& mesh) {
 }
 
 /// The nodes from i on that share a tetrahedron with node i, ascending, i among them.
-void neighbours(const TetMesh& mesh, const Uses& uses, std::size_t i,
+void neighbours(const tetrahedra::TetMesh& mesh, const Uses& uses, std::size_t i,
                 std::vector<std::uint32_t>& found) {
   const std::size_t count = solid_nodes(mesh);
   found.assign(1, static_cast<std::uint32_t>(i));
@@ -60,14 +61,16 @@ void neighbours(const TetMesh& mesh, const Uses& uses, std::size_t i,
   found.erase(repeated.begin(), repeated.end());
 }
 
-std::size_t free_axes(const StiffnessMatrix& matrix, std::size_t node, std::size_t first = 0) {
+std::size_t free_axes(const linalg::StiffnessMatrix& matrix, std::size_t node,
+                      std::size_t first = 0) {
   std::size_t count = 0;
   for (std::size_t axis = first; axis < 3; ++axis)
     count += matrix.row_of_axis[3 * node + axis] >= 0 ? 1 : 0;
   return count;
 }
 
-void number_axes(std::size_t nodes, std::span<const std::uint8_t> fixed, StiffnessMatrix& matrix) {
+void number_axes(std::size_t nodes, std::span<const std::uint8_t> fixed,
+                 linalg::StiffnessMatrix& matrix) {
   matrix.row_of_axis.assign(3 * nodes, -1);
   for (std::size_t axis = 0; axis < 3 * nodes; ++axis)
     if (fixed.empty() || fixed[axis] == 0) {
@@ -78,9 +81,9 @@ void number_axes(std::size_t nodes, std::span<const std::uint8_t> fixed, Stiffne
     throw Error("every node is fixed along every axis, expected a node that can move");
 }
 
-void check_middles(const TetMesh& mesh, std::size_t t) {
+void check_middles(const tetrahedra::TetMesh& mesh, std::size_t t) {
   for (std::size_t k = 0; k < 6; ++k) {
-    const auto [a, b] = tetrahedron_edges[k];
+    const auto [a, b] = tetrahedra::tetrahedron_edges[k];
     const Vec3 &p = mesh.points[mesh.tetrahedra[t][a]], &q = mesh.points[mesh.tetrahedra[t][b]];
     if (!(norm(mesh.points[mesh.middles[t][k]] - (p + q) / 2) <= straight * norm(q - p)))
       throw Error("tetrahedron " + std::to_string(t) +
@@ -90,7 +93,7 @@ void check_middles(const TetMesh& mesh, std::size_t t) {
 
 } // namespace
 
-std::vector<SolidElement> solid_elements(const TetMesh& mesh,
+std::vector<SolidElement> solid_elements(const tetrahedra::TetMesh& mesh,
                                          std::span<const SolidMaterial> materials,
                                          const Context& context) {
   std::vector<Elasticity> elasticities;
@@ -112,7 +115,7 @@ std::vector<SolidElement> solid_elements(const TetMesh& mesh,
       const Tetrahedron& c = mesh.tetrahedra[t];
       const std::array<Vec3, 4> corners{mesh.points[c[0]], mesh.points[c[1]], mesh.points[c[2]],
                                         mesh.points[c[3]]};
-      if (!(tetrahedron_volume(corners[0], corners[1], corners[2], corners[3]) > 0))
+      if (!(tetrahedra::tetrahedron_volume(corners[0], corners[1], corners[2], corners[3]) > 0))
         throw Error("tetrahedron " + std::to_string(t) + " has no positive volume");
       elements[t] = solid_element(corners, elasticities[m]);
       elements[t].law = materials[m].law;
@@ -121,17 +124,20 @@ std::vector<SolidElement> solid_elements(const TetMesh& mesh,
   return elements;
 }
 
-StiffnessMatrix solid_stiffness(const TetMesh& mesh, std::span<const SolidElement> elements,
-                                std::span<const std::uint8_t> fixed, const Context& context) {
+linalg::StiffnessMatrix solid_stiffness(const tetrahedra::TetMesh& mesh,
+                                        std::span<const SolidElement> elements,
+                                        std::span<const std::uint8_t> fixed,
+                                        const Context& context) {
   return assembled_matrix(
       mesh,
       [&](std::size_t t, std::size_t a, std::size_t b) { return block(mesh, elements[t], a, b); },
       fixed, context);
 }
 
-StiffnessMatrix assembled_matrix(const TetMesh& mesh, const BlockOf& block_of,
-                                 std::span<const std::uint8_t> fixed, const Context& context) {
-  StiffnessMatrix matrix;
+linalg::StiffnessMatrix assembled_matrix(const tetrahedra::TetMesh& mesh, const BlockOf& block_of,
+                                         std::span<const std::uint8_t> fixed,
+                                         const Context& context) {
+  linalg::StiffnessMatrix matrix;
   const std::size_t nodes = mesh.points.size(), count = solid_nodes(mesh);
   number_axes(nodes, fixed, matrix);
   const Uses uses = uses_of(mesh);
@@ -196,10 +202,10 @@ StiffnessMatrix assembled_matrix(const TetMesh& mesh, const BlockOf& block_of,
   return matrix;
 }
 
-StiffnessMatrix sum(const StiffnessMatrix& a, const StiffnessMatrix& b) {
+linalg::StiffnessMatrix sum(const linalg::StiffnessMatrix& a, const linalg::StiffnessMatrix& b) {
   if (a.row_of_axis != b.row_of_axis)
     throw Error("two stiffness matrices have different free axes");
-  StiffnessMatrix result;
+  linalg::StiffnessMatrix result;
   result.row_of_axis = a.row_of_axis;
   result.axis_of_row = a.axis_of_row;
   result.column_start.push_back(0);
@@ -221,7 +227,7 @@ StiffnessMatrix sum(const StiffnessMatrix& a, const StiffnessMatrix& b) {
   return result;
 }
 
-void multiply_solid(const TetMesh& mesh, std::span<const SolidElement> elements,
+void multiply_solid(const tetrahedra::TetMesh& mesh, std::span<const SolidElement> elements,
                     std::span<const double> u, std::span<double> f) {
   std::ranges::fill(f, 0.0);
   const std::size_t count = solid_nodes(mesh);
@@ -237,21 +243,23 @@ void multiply_solid(const TetMesh& mesh, std::span<const SolidElement> elements,
       }
 }
 
-std::vector<double> solid_masses(const TetMesh& mesh, std::span<const SolidMaterial> materials) {
+std::vector<double> solid_masses(const tetrahedra::TetMesh& mesh,
+                                 std::span<const SolidMaterial> materials) {
   std::vector<double> masses(mesh.points.size());
   const bool quadratic = !mesh.middles.empty();
   for (std::size_t t = 0; t < mesh.tetrahedra.size(); ++t) {
     const Tetrahedron& c = mesh.tetrahedra[t];
     const double mass = materials[material_of(mesh, t)].density *
-                        tetrahedron_volume(mesh.points[c[0]], mesh.points[c[1]], mesh.points[c[2]],
-                                           mesh.points[c[3]]);
+                        tetrahedra::tetrahedron_volume(mesh.points[c[0]], mesh.points[c[1]],
+                                                       mesh.points[c[2]], mesh.points[c[3]]);
     for (std::size_t a = 0; a < solid_nodes(mesh); ++a)
       masses[solid_node(mesh, t, a)] += mass * (!quadratic ? 1.0 / 4 : a < 4 ? 1.0 / 36 : 4.0 / 27);
   }
   return masses;
 }
 
-std::vector<double> gravity_load(const TetMesh& mesh, std::span<const SolidMaterial> materials,
+std::vector<double> gravity_load(const tetrahedra::TetMesh& mesh,
+                                 std::span<const SolidMaterial> materials,
                                  std::span<const SolidElement> elements, const Vec3& acceleration) {
   std::vector<double> load(3 * mesh.points.size());
   std::array<Vec3, 10> force;
@@ -270,8 +278,8 @@ std::vector<double> gravity_load(const TetMesh& mesh, std::span<const SolidMater
 namespace {
 
 /// Thirds of a force on three nodes.
-void add_thirds(const TetMesh& mesh, const TetBoundary& of_mesh, std::uint32_t triangle,
-                const Vec3& force, std::vector<double>& load) {
+void add_thirds(const tetrahedra::TetMesh& mesh, const tetrahedra::TetBoundary& of_mesh,
+                std::uint32_t triangle, const Vec3& force, std::vector<double>& load) {
   for (std::size_t k = 0; k < 3; ++k) {
     const std::uint32_t node = mesh.middles.empty()
                                    ? of_mesh.node[of_mesh.mesh.triangles[triangle][k]]
@@ -282,7 +290,7 @@ void add_thirds(const TetMesh& mesh, const TetBoundary& of_mesh, std::uint32_t t
 }
 
 /// The triangle's normal, as long as its area.
-Vec3 area(const TetBoundary& of_mesh, std::uint32_t triangle) {
+Vec3 area(const tetrahedra::TetBoundary& of_mesh, std::uint32_t triangle) {
   const auto [a, b, c] = of_mesh.mesh.triangles[triangle];
   const std::vector<Vec3>& p = of_mesh.mesh.points;
   return cross(p[b] - p[a], p[c] - p[a]) / 2;
@@ -290,7 +298,8 @@ Vec3 area(const TetBoundary& of_mesh, std::uint32_t triangle) {
 
 } // namespace
 
-std::vector<double> traction_load(const TetMesh& mesh, const TetBoundary& of_mesh,
+std::vector<double> traction_load(const tetrahedra::TetMesh& mesh,
+                                  const tetrahedra::TetBoundary& of_mesh,
                                   std::span<const std::uint32_t> triangles, const Vec3& traction) {
   std::vector<double> load(3 * mesh.points.size());
   for (const std::uint32_t triangle : triangles)
@@ -298,7 +307,8 @@ std::vector<double> traction_load(const TetMesh& mesh, const TetBoundary& of_mes
   return load;
 }
 
-std::vector<double> pressure_load(const TetMesh& mesh, const TetBoundary& of_mesh,
+std::vector<double> pressure_load(const tetrahedra::TetMesh& mesh,
+                                  const tetrahedra::TetBoundary& of_mesh,
                                   std::span<const std::uint32_t> triangles, double pressure) {
   std::vector<double> load(3 * mesh.points.size());
   for (const std::uint32_t triangle : triangles)
@@ -306,4 +316,4 @@ std::vector<double> pressure_load(const TetMesh& mesh, const TetBoundary& of_mes
   return load;
 }
 
-} // namespace gewebe
+} // namespace gewebe::fem

@@ -17,39 +17,40 @@
 #include <span>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::fem {
 
 struct SolidMaterial {
-  double young = 1e4;    ///< Young's modulus, Pa
-  double poisson = 0.49; ///< Poisson's ratio, 0 to below 1/2
-  double density = 1e-3; ///< g/mm³
-  HyperelasticLaw law{}; ///< of large strains (fem/hyperelastic.h)
+  double young = 1e4;           ///< Young's modulus, Pa
+  double poisson = 0.49;        ///< Poisson's ratio, 0 to below 1/2
+  double density = 1e-3;        ///< g/mm³
+  model::HyperelasticLaw law{}; ///< of large strains (fem/hyperelastic.h)
   /// None: elastic. Read where a body is made of it (viscous/solid_memory.h).
-  std::span<const PronyTerm> prony{};
+  std::span<const model::PronyTerm> prony{};
 };
 
 /// The elements of a mesh whose tetrahedra are of materials[mesh.material[t]], or all of the first.
 /// \pre check_mesh(mesh) passes   \throw Error naming the first tetrahedron without a positive
 /// volume, with a material that isn't there, or with a middle away from its edge's; if a material's
 /// value is out of its range; Cancelled
-std::vector<SolidElement> solid_elements(const TetMesh& mesh,
+std::vector<SolidElement> solid_elements(const tetrahedra::TetMesh& mesh,
                                          std::span<const SolidMaterial> materials,
                                          const Context& context = {});
 
 /// K of the elements of `mesh` on the axes that `fixed` (empty, or 3 n flags) leaves free; nodes
 /// count as in mesh.points. A node of no tetrahedron has rows of 0. \pre elements are those of the
 /// mesh   \throw Error if no axis is free, or a sum isn't finite; Cancelled
-StiffnessMatrix solid_stiffness(const TetMesh& mesh, std::span<const SolidElement> elements,
-                                std::span<const std::uint8_t> fixed = {},
-                                const Context& context = {});
+linalg::StiffnessMatrix solid_stiffness(const tetrahedra::TetMesh& mesh,
+                                        std::span<const SolidElement> elements,
+                                        std::span<const std::uint8_t> fixed = {},
+                                        const Context& context = {});
 
 /// The sum of two matrices on the same axes, as of springs and of solids.
 /// \throw Error if their axes differ
-StiffnessMatrix sum(const StiffnessMatrix& a, const StiffnessMatrix& b);
+linalg::StiffnessMatrix sum(const linalg::StiffnessMatrix& a, const linalg::StiffnessMatrix& b);
 
 /// f = K u over all 3 n axes, the fixed ones too, where it is what the supports hold against.
 /// \pre u.size() == f.size() == 3 n
-void multiply_solid(const TetMesh& mesh, std::span<const SolidElement> elements,
+void multiply_solid(const tetrahedra::TetMesh& mesh, std::span<const SolidElement> elements,
                     std::span<const double> u, std::span<double> f);
 
 /// The mass of each node, g: that of its tetrahedra, shared out in proportion to the diagonal of
@@ -57,21 +58,25 @@ void multiply_solid(const TetMesh& mesh, std::span<const SolidElement> elements,
 /// the finite element method, 1976): 1/4 to each corner of a linear element; 1/36 to each corner
 /// and 4/27 to each middle of a quadratic one, where row sums would be negative.
 /// \pre as for solid_elements, which passed
-std::vector<double> solid_masses(const TetMesh& mesh, std::span<const SolidMaterial> materials);
+std::vector<double> solid_masses(const tetrahedra::TetMesh& mesh,
+                                 std::span<const SolidMaterial> materials);
 
 /// The forces of gravity on each axis under an acceleration in mm/s²: consistent loads, with what
 /// bubbles hand on. \pre elements are those of the mesh and the materials
-std::vector<double> gravity_load(const TetMesh& mesh, std::span<const SolidMaterial> materials,
+std::vector<double> gravity_load(const tetrahedra::TetMesh& mesh,
+                                 std::span<const SolidMaterial> materials,
                                  std::span<const SolidElement> elements, const Vec3& acceleration);
 
 /// The forces of a constant traction (Pa) on triangles of the boundary: thirds of the force on the
 /// corners of linear elements, on the middles of quadratic ones, whose corners carry nothing.
 /// \pre `of_mesh` is boundary(mesh), triangles are below its count
-std::vector<double> traction_load(const TetMesh& mesh, const TetBoundary& of_mesh,
+std::vector<double> traction_load(const tetrahedra::TetMesh& mesh,
+                                  const tetrahedra::TetBoundary& of_mesh,
                                   std::span<const std::uint32_t> triangles, const Vec3& traction);
 
 /// The same of a pressure (Pa), which acts against the normals at rest.
-std::vector<double> pressure_load(const TetMesh& mesh, const TetBoundary& of_mesh,
+std::vector<double> pressure_load(const tetrahedra::TetMesh& mesh,
+                                  const tetrahedra::TetBoundary& of_mesh,
                                   std::span<const std::uint32_t> triangles, double pressure);
 
-} // namespace gewebe
+} // namespace gewebe::fem

@@ -11,13 +11,13 @@
 #include <functional>
 #include <span>
 
-namespace gewebe {
+namespace gewebe::fem {
 
-inline std::size_t solid_nodes(const TetMesh& mesh) {
+inline std::size_t solid_nodes(const tetrahedra::TetMesh& mesh) {
   return mesh.middles.empty() ? 4 : 10;
 }
 
-inline std::uint32_t solid_node(const TetMesh& mesh, std::size_t t, std::size_t a) {
+inline std::uint32_t solid_node(const tetrahedra::TetMesh& mesh, std::size_t t, std::size_t a) {
   return a < 4 ? mesh.tetrahedra[t][a] : mesh.middles[t][a - 4];
 }
 
@@ -26,7 +26,8 @@ inline std::uint32_t solid_node(const TetMesh& mesh, std::size_t t, std::size_t 
 using BlockOf = std::function<SolidBlock(std::size_t t, std::size_t a, std::size_t b)>;
 
 /// As solid_stiffness, of the blocks given.
-StiffnessMatrix assembled_matrix(const TetMesh& mesh, const BlockOf& block_of,
-                                 std::span<const std::uint8_t> fixed, const Context& context);
+linalg::StiffnessMatrix assembled_matrix(const tetrahedra::TetMesh& mesh, const BlockOf& block_of,
+                                         std::span<const std::uint8_t> fixed,
+                                         const Context& context);
 
-} // namespace gewebe
+} // namespace gewebe::fem

@@ -9,7 +9,7 @@
 #include <numeric>
 #include <utility>
 
-namespace gewebe {
+namespace gewebe::fem {
 
 namespace {
 
@@ -96,7 +96,7 @@ struct Groups {
   double elastic = 0;
   bool remembered = false; ///< the last strains are `before`
 
-  void make(const TetMesh& mesh, std::span<const SolidElement> elements,
+  void make(const tetrahedra::TetMesh& mesh, std::span<const SolidElement> elements,
             const CorotationalNotes& notes) {
     groups.resize((elements.size() + 3) / 4);
     strains = std::make_shared<Strains>(notes.strains ? groups.size() : 0);
@@ -220,7 +220,8 @@ CorotationalSolid::~CorotationalSolid() = default;
 CorotationalSolid::CorotationalSolid(CorotationalSolid&&) noexcept = default;
 CorotationalSolid& CorotationalSolid::operator=(CorotationalSolid&&) noexcept = default;
 
-CorotationalSolid::CorotationalSolid(const TetMesh& mesh, std::span<const SolidElement> elements,
+CorotationalSolid::CorotationalSolid(const tetrahedra::TetMesh& mesh,
+                                     std::span<const SolidElement> elements,
                                      const CorotationalNotes& notes)
     : state_(std::make_unique<State>()) {
   State& s = *state_;
@@ -278,4 +279,4 @@ ElementFrame CorotationalSolid::frame(std::size_t t) const {
   return state_->with([&](const auto& of) { return of.frame(t); });
 }
 
-} // namespace gewebe
+} // namespace gewebe::fem

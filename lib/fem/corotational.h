@@ -31,7 +31,7 @@
 #include <span>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::fem {
 
 /// The potential is the energy times `elastic` plus that of damping times `damping`.
 struct CorotationalWeights {
@@ -41,7 +41,7 @@ struct CorotationalWeights {
 /// What an element is turned and stretched by: for tangents.
 struct ElementFrame {
   SolidBlock rotation{};
-  SymmetricBlock stretch{}; ///< Rᵀ F in the middle
+  linalg::SymmetricBlock stretch{}; ///< Rᵀ F in the middle
 };
 
 /// What is written down of every element in every evaluation, which takes a third of its time.
@@ -53,7 +53,7 @@ struct CorotationalNotes {
 class CorotationalSolid {
 public:
   /// \pre elements are those of the mesh
-  CorotationalSolid(const TetMesh& mesh, std::span<const SolidElement> elements,
+  CorotationalSolid(const tetrahedra::TetMesh& mesh, std::span<const SolidElement> elements,
                     const CorotationalNotes& notes = {});
   ~CorotationalSolid();
   CorotationalSolid(CorotationalSolid&&) noexcept;
@@ -85,4 +85,4 @@ private:
   std::unique_ptr<State> state_;
 };
 
-} // namespace gewebe
+} // namespace gewebe::fem

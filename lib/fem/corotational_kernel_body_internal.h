@@ -7,7 +7,7 @@
 #include <array>
 #include <cmath>
 
-namespace gewebe {
+namespace gewebe::fem {
 namespace {
 
 using Whole = long long __attribute__((vector_size(32)));
@@ -17,20 +17,20 @@ inline constexpr int entry[3][3] = {{0, 1, 2}, {1, 3, 4}, {2, 4, 5}};
 
 /// By rows.
 struct Matrix {
-  Four m[9];
+  numeric::Four m[9];
 };
 struct Symmetric {
-  Four m[6];
+  numeric::Four m[6];
 };
 struct Vector {
-  Four v[3];
+  numeric::Four v[3];
 };
 
 inline void gather(const double* values, const std::uint32_t* node, Vector& to) {
   const double *a = values + 3 * std::size_t{node[0]}, *b = values + 3 * std::size_t{node[1]},
                *c = values + 3 * std::size_t{node[2]}, *d = values + 3 * std::size_t{node[3]};
   for (int i = 0; i < 3; ++i)
-    to.v[i] = Four{a[i], b[i], c[i], d[i]};
+    to.v[i] = numeric::Four{a[i], b[i], c[i], d[i]};
 }
 
 /// aᵀ b
@@ -88,13 +88,13 @@ inline void robust_rotation(const std::array<double, 9>& f, std::array<double, 9
 /// What the rotation of f is made of: its cofactors, and invariants.
 struct Invariants {
   Matrix cofactor;
-  Four square, det, cofactors; ///< |f|², det f, |cof f|²
-  Four t;
+  numeric::Four square, det, cofactors; ///< |f|², det f, |cof f|²
+  numeric::Four t;
 };
 
 inline void invariants(const Matrix& f, Invariants& of) {
-  const Four* const m = f.m;
-  Four* const c = of.cofactor.m;
+  const numeric::Four* const m = f.m;
+  numeric::Four* const c = of.cofactor.m;
   for (std::size_t i = 0; i < 3; ++i) {
     const std::size_t k = 3 * ((i + 1) % 3), l = 3 * ((i + 2) % 3);
     c[3 * i] = m[k + 1] * m[l + 2] - m[k + 2] * m[l + 1];
@@ -123,10 +123,10 @@ inline void sums_of_stretches(Invariants* of, std::size_t count) {
     Whole done = ~Whole{};
     for (std::size_t n = 0; n < count; ++n) {
       Invariants& o = of[n];
-      const Four over = o.t * o.t - o.square,
-                 step = (over * over - 8 * o.det * o.t - 4 * o.cofactors) /
-                        (4 * o.t * over - 8 * o.det),
-                 t = o.t - step, most = 1e-9 * t;
+      const numeric::Four over = o.t * o.t - o.square,
+                          step = (over * over - 8 * o.det * o.t - 4 * o.cofactors) /
+                                 (4 * o.t * over - 8 * o.det),
+                          t = o.t - step, most = 1e-9 * t;
       o.t = t;
       done &= (step <= most) & (-step <= most);
     }
@@ -138,9 +138,9 @@ inline void sums_of_stretches(Invariants* of, std::size_t count) {
 /// The same as robust_rotation() of four. Cayley-Hamilton gives r without the stretch's inverse:
 /// r Π (s_i + s_j) = t cof f + (t² - i) f - f fᵀ f, i = (t² - |f|²) / 2.
 inline void rotation(const Matrix& f, const Invariants& of, Matrix& r) {
-  const Four* const m = f.m;
-  const Four t = of.t, second = 0.5 * (t * t - of.square), pairs = t * second - of.det,
-             inverse = 1 / pairs;
+  const numeric::Four* const m = f.m;
+  const numeric::Four t = of.t, second = 0.5 * (t * t - of.square), pairs = t * second - of.det,
+                      inverse = 1 / pairs;
   Matrix right;
   transposed_product(f, f, right);
   for (std::size_t i = 0; i < 3; ++i)
@@ -163,12 +163,13 @@ inline void rotation(const Matrix& f, const Invariants& of, Matrix& r) {
 /// w = (tr(s) 1 - s)⁻¹ t: how far the frame turns, per asymmetry of the deformation; 0 where that
 /// isn't defined.
 inline void turn_back(const Symmetric& s, const Vector& t, Vector& w) {
-  const Four trace = s.m[0] + s.m[3] + s.m[5];
-  const Four a = trace - s.m[0], d = trace - s.m[3], f = trace - s.m[5], b = -s.m[1], c = -s.m[2],
-             e = -s.m[4];
-  const Four xx = d * f - e * e, xy = c * e - b * f, xz = b * e - c * d, yy = a * f - c * c,
-             yz = b * c - a * e, zz = a * d - b * b, det = a * xx + b * xy + c * xz;
-  Four inverse = 1 / det;
+  const numeric::Four trace = s.m[0] + s.m[3] + s.m[5];
+  const numeric::Four a = trace - s.m[0], d = trace - s.m[3], f = trace - s.m[5], b = -s.m[1],
+                      c = -s.m[2], e = -s.m[4];
+  const numeric::Four xx = d * f - e * e, xy = c * e - b * f, xz = b * e - c * d,
+                      yy = a * f - c * c, yz = b * c - a * e, zz = a * d - b * b,
+                      det = a * xx + b * xy + c * xz;
+  numeric::Four inverse = 1 / det;
   for (int l = 0; l < 4; ++l)
     if (!(det[l] > 1e-6 * trace[l] * trace[l] * trace[l]))
       inverse[l] = 0;
@@ -204,7 +205,7 @@ template <std::size_t Nodes>
 inline void gradients(const CorotationalGroup<Nodes>& g, Vector (&gradient)[4]) {
   for (int i = 0; i < 3; ++i) {
     for (int k = 0; k < 3; ++k)
-      gradient[k + 1].v[i] = four(g.gradient[k][i]);
+      gradient[k + 1].v[i] = numeric::four(g.gradient[k][i]);
     gradient[0].v[i] = -(gradient[1].v[i] + gradient[2].v[i] + gradient[3].v[i]);
   }
 }
@@ -223,8 +224,8 @@ inline void begin_group(const CorotationalGroup<Nodes>& g, const double* x,
   }
   Matrix(&f)[points] = begun.f;
   for (std::size_t p = 0; p < points; ++p) {
-    for (Four& m : f[p].m)
-      m = Four{};
+    for (numeric::Four& m : f[p].m)
+      m = numeric::Four{};
     for_parts<Nodes>(p, [&](std::size_t a, std::size_t k, double factor) {
       for (int i = 0; i < 3; ++i)
         for (int j = 0; j < 3; ++j)
@@ -245,7 +246,8 @@ void end_group(const CorotationalGroup<Nodes>& g, const GroupBegun<Nodes>& begun
                const CorotationalWeights& weights, CorotationalResult<Nodes>& result,
                CorotationalStrains<Nodes>* strains) {
   constexpr std::size_t points = CorotationalGroup<Nodes>::points;
-  const Four volume = four(g.volume), mu = four(g.mu), lambda = four(g.lambda);
+  const numeric::Four volume = numeric::four(g.volume), mu = numeric::four(g.mu),
+                      lambda = numeric::four(g.lambda);
   const Matrix(&f)[points] = begun.f;
   const Matrix& middle = begun.middle;
   Vector gradient[4];
@@ -258,9 +260,9 @@ void end_group(const CorotationalGroup<Nodes>& g, const GroupBegun<Nodes>& begun
   Symmetric stress[points];
   Symmetric now[points];
   const auto stress_of = [&](const Symmetric& e, Symmetric& s) {
-    const Four volumetric = lambda * (e.m[0] + e.m[3] + e.m[5]);
+    const numeric::Four volumetric = lambda * (e.m[0] + e.m[3] + e.m[5]);
     for (int k = 0; k < 6; ++k)
-      s.m[k] = 2 * mu * e.m[k] + (k == 0 || k == 3 || k == 5 ? volumetric : Four{});
+      s.m[k] = 2 * mu * e.m[k] + (k == 0 || k == 3 || k == 5 ? volumetric : numeric::Four{});
   };
   for (std::size_t p = 0; p < points; ++p) {
     transposed_product(r, f[p], turned[p]);
@@ -269,7 +271,7 @@ void end_group(const CorotationalGroup<Nodes>& g, const GroupBegun<Nodes>& begun
         now[p].m[entry[i][j]] =
             0.5 * (turned[p].m[3 * i + j] + turned[p].m[3 * j + i]) - (i == j ? 1 : 0);
     for (std::size_t k = 0; strains != nullptr && k < 6; ++k)
-      four(strains->value[6 * p + k]) = now[p].m[k];
+      numeric::four(strains->value[6 * p + k]) = now[p].m[k];
   }
   // The energy of strains e, and its derivative by them; the bubble eliminated.
   const auto work = [&](const Symmetric(&e)[points], Symmetric(&force)[points]) {
@@ -278,22 +280,22 @@ void end_group(const CorotationalGroup<Nodes>& g, const GroupBegun<Nodes>& begun
       stress_of(e[p], s[p]);
     if constexpr (Nodes == 4) {
       force[0] = s[0];
-      for (Four& m : force[0].m)
+      for (numeric::Four& m : force[0].m)
         m *= volume;
     } else {
       Vector divergence, w;
       for (int k = 0; k < 6; ++k)
         total.m[k] = s[0].m[k] + s[1].m[k] + s[2].m[k] + s[3].m[k];
       for (int i = 0; i < 3; ++i) {
-        divergence.v[i] = Four{};
+        divergence.v[i] = numeric::Four{};
         for (std::size_t p = 0; p < points; ++p)
           for (int j = 0; j < 3; ++j)
             divergence.v[i] += s[p].m[entry[i][j]] * gradient[p].v[j];
       }
       for (int i = 0; i < 3; ++i) {
-        w.v[i] = Four{};
+        w.v[i] = numeric::Four{};
         for (int j = 0; j < 3; ++j)
-          w.v[i] += four(g.flexibility[entry[i][j]]) * divergence.v[j];
+          w.v[i] += numeric::four(g.flexibility[entry[i][j]]) * divergence.v[j];
       }
       for (std::size_t p = 0; p < points; ++p) {
         Symmetric slope, handed;
@@ -305,7 +307,7 @@ void end_group(const CorotationalGroup<Nodes>& g, const GroupBegun<Nodes>& begun
           force[p].m[k] = volume * 0.05 * (s[p].m[k] + total.m[k]) - handed.m[k];
       }
     }
-    Four twice = Four{};
+    numeric::Four twice = numeric::Four{};
     for (std::size_t p = 0; p < points; ++p)
       for (int i = 0; i < 3; ++i)
         for (int j = 0; j < 3; ++j)
@@ -313,18 +315,18 @@ void end_group(const CorotationalGroup<Nodes>& g, const GroupBegun<Nodes>& begun
     return Symmetric{{0.5 * twice}}; // its first entry; a vector would be returned by another rule
   };
   if (weights.damping == 0) {
-    four(result.elastic) = work(now, stress).m[0];
-    four(result.damping) = Four{};
+    numeric::four(result.elastic) = work(now, stress).m[0];
+    numeric::four(result.damping) = numeric::Four{};
     for (std::size_t p = 0; p < points; ++p)
-      for (Four& m : stress[p].m)
+      for (numeric::Four& m : stress[p].m)
         m *= weights.elastic;
   } else {
     Symmetric change[points], of_change[points];
     for (std::size_t p = 0; p < points; ++p)
       for (std::size_t k = 0; k < 6; ++k)
-        change[p].m[k] = now[p].m[k] - four(before->value[6 * p + k]);
-    four(result.elastic) = work(now, stress).m[0];
-    four(result.damping) = work(change, of_change).m[0];
+        change[p].m[k] = now[p].m[k] - numeric::four(before->value[6 * p + k]);
+    numeric::four(result.elastic) = work(now, stress).m[0];
+    numeric::four(result.damping) = work(change, of_change).m[0];
     for (std::size_t p = 0; p < points; ++p)
       for (int k = 0; k < 6; ++k)
         stress[p].m[k] = stress[p].m[k] * weights.elastic + of_change[p].m[k] * weights.damping;
@@ -332,16 +334,17 @@ void end_group(const CorotationalGroup<Nodes>& g, const GroupBegun<Nodes>& begun
 
   // The frame turns with the middle: what the stresses do by that goes back on it.
   Vector moment, back;
-  for (Four& m : moment.v)
-    m = Four{};
+  for (numeric::Four& m : moment.v)
+    m = numeric::Four{};
   for (std::size_t p = 0; p < points; ++p) {
-    const Four* const a = turned[p].m;
-    const Four* const s = stress[p].m;
-    const auto entry_of = [&](std::size_t i, std::size_t j, Four& to) { // of turned · stress
+    const numeric::Four* const a = turned[p].m;
+    const numeric::Four* const s = stress[p].m;
+    const auto entry_of = [&](std::size_t i, std::size_t j,
+                              numeric::Four& to) { // of turned · stress
       to =
           a[3 * i] * s[entry[0][j]] + a[3 * i + 1] * s[entry[1][j]] + a[3 * i + 2] * s[entry[2][j]];
     };
-    Four one, other;
+    numeric::Four one, other;
     for (std::size_t k = 0; k < 3; ++k) {
       const std::size_t i = (k + 1) % 3, j = (k + 2) % 3;
       entry_of(i, j, one);
@@ -357,7 +360,7 @@ void end_group(const CorotationalGroup<Nodes>& g, const GroupBegun<Nodes>& begun
   turn_back(stretch, moment, back);
 
   for (std::size_t k = 0; k < 3 * Nodes; ++k)
-    four(result.force[k]) = Four{};
+    numeric::four(result.force[k]) = numeric::Four{};
   for (std::size_t p = 0; p < points; ++p) {
     Matrix local, acts;
     for (int i = 0; i < 3; ++i)
@@ -379,19 +382,19 @@ void end_group(const CorotationalGroup<Nodes>& g, const GroupBegun<Nodes>& begun
                         acts.m[3 * i + 2] * gradient[k].v[2];
     for_parts<Nodes>(p, [&](std::size_t a, std::size_t k, double factor) {
       for (std::size_t i = 0; i < 3; ++i)
-        four(result.force[3 * a + i]) -= along[k].v[i] * factor;
+        numeric::four(result.force[3 * a + i]) -= along[k].v[i] * factor;
     });
   }
   for (int k = 0; k < 9; ++k)
-    four(result.rotation.value[k]) = r.m[k];
+    numeric::four(result.rotation.value[k]) = r.m[k];
 }
 
 /// Four vectors, by lanes in place of by entries.
-inline void transpose(const Four (&rows)[4], Four (&lanes)[4]) {
-  const Four a = __builtin_shufflevector(rows[0], rows[1], 0, 4, 2, 6),
-             b = __builtin_shufflevector(rows[0], rows[1], 1, 5, 3, 7),
-             c = __builtin_shufflevector(rows[2], rows[3], 0, 4, 2, 6),
-             d = __builtin_shufflevector(rows[2], rows[3], 1, 5, 3, 7);
+inline void transpose(const numeric::Four (&rows)[4], numeric::Four (&lanes)[4]) {
+  const numeric::Four a = __builtin_shufflevector(rows[0], rows[1], 0, 4, 2, 6),
+                      b = __builtin_shufflevector(rows[0], rows[1], 1, 5, 3, 7),
+                      c = __builtin_shufflevector(rows[2], rows[3], 0, 4, 2, 6),
+                      d = __builtin_shufflevector(rows[2], rows[3], 1, 5, 3, 7);
   lanes[0] = __builtin_shufflevector(a, c, 0, 1, 4, 5);
   lanes[1] = __builtin_shufflevector(b, d, 0, 1, 4, 5);
   lanes[2] = __builtin_shufflevector(a, c, 2, 3, 6, 7);
@@ -403,27 +406,27 @@ template <std::size_t Nodes>
 inline void add_group(const CorotationalGroup<Nodes>& g, const CorotationalResult<Nodes>& result,
                       const CorotationalPlaces<Nodes>& places, bool turns, double* sums) {
   const std::size_t width = turns ? corotational_turned : corotational_force;
-  const Four volume = four(g.volume);
-  Four rows[4], force[4], first[4], rest[4];
+  const numeric::Four volume = numeric::four(g.volume);
+  numeric::Four rows[4], force[4], first[4], rest[4];
   if (turns) {
     for (int k = 0; k < 4; ++k)
-      rows[k] = volume * four(result.rotation.value[1 + k]);
+      rows[k] = volume * numeric::four(result.rotation.value[1 + k]);
     transpose(rows, first);
     for (int k = 0; k < 4; ++k)
-      rows[k] = volume * four(result.rotation.value[5 + k]);
+      rows[k] = volume * numeric::four(result.rotation.value[5 + k]);
     transpose(rows, rest);
   }
   for (std::size_t a = 0; a < Nodes; ++a) {
     for (std::size_t i = 0; i < 3; ++i)
-      rows[i] = four(result.force[3 * a + i]);
-    rows[3] = volume * four(result.rotation.value[0]);
+      rows[i] = numeric::four(result.force[3 * a + i]);
+    rows[3] = volume * numeric::four(result.rotation.value[0]);
     transpose(rows, force);
     for (std::size_t lane = 0; lane < 4; ++lane) {
       double* const to = sums + width * places[a][lane];
-      four(to) += force[lane];
+      numeric::four(to) += force[lane];
       if (turns) {
-        four(to + 4) += first[lane];
-        four(to + 8) += rest[lane];
+        numeric::four(to + 4) += first[lane];
+        numeric::four(to + 8) += rest[lane];
       }
     }
   }
@@ -455,17 +458,17 @@ inline void turn(double (*matrices)[4], std::size_t count) {
         count - begin < corotational_together ? count - begin : corotational_together;
     for (std::size_t n = 0; n < together; ++n) {
       for (std::size_t k = 0; k < 9; ++k)
-        f[n].m[k] = four(matrices[9 * (begin + n) + k]);
+        f[n].m[k] = numeric::four(matrices[9 * (begin + n) + k]);
       invariants(f[n], of[n]);
     }
     sums_of_stretches(of, together);
     for (std::size_t n = 0; n < together; ++n) {
       rotation(f[n], of[n], r);
       for (std::size_t k = 0; k < 9; ++k)
-        four(matrices[9 * (begin + n) + k]) = r.m[k];
+        numeric::four(matrices[9 * (begin + n) + k]) = r.m[k];
     }
   }
 }
 
 } // namespace
-} // namespace gewebe
+} // namespace gewebe::fem

@@ -9,7 +9,7 @@
 #include <cstddef>
 #include <cstdint>
 
-namespace gewebe {
+namespace gewebe::fem {
 
 /// Four tetrahedra side by side; those that fill up the last group have no volume.
 template <std::size_t Nodes>
@@ -83,4 +83,4 @@ inline const CorotationalKernel& corotational_kernel(CpuLevel level) {
   return level == CpuLevel::baseline ? corotational_kernel_baseline : corotational_kernel_avx2;
 }
 
-} // namespace gewebe
+} // namespace gewebe::fem

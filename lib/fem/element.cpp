@@ -5,7 +5,7 @@
 
 #include <cmath>
 
-namespace gewebe {
+namespace gewebe::fem {
 
 namespace {
 
@@ -34,17 +34,17 @@ Vec3 product(const SolidBlock& a, const Vec3& v) {
           a[6] * v.x + a[7] * v.y + a[8] * v.z};
 }
 
-SolidBlock full(const SymmetricBlock& s) {
+SolidBlock full(const linalg::SymmetricBlock& s) {
   return {s[0], s[1], s[2], s[1], s[3], s[4], s[2], s[4], s[5]};
 }
 
 /// \pre positive definite
-SymmetricBlock inverse(const SymmetricBlock& m) {
-  const SymmetricBlock cofactor{m[3] * m[5] - m[4] * m[4], m[2] * m[4] - m[1] * m[5],
-                                m[1] * m[4] - m[2] * m[3], m[0] * m[5] - m[2] * m[2],
-                                m[1] * m[2] - m[0] * m[4], m[0] * m[3] - m[1] * m[1]};
+linalg::SymmetricBlock inverse(const linalg::SymmetricBlock& m) {
+  const linalg::SymmetricBlock cofactor{m[3] * m[5] - m[4] * m[4], m[2] * m[4] - m[1] * m[5],
+                                        m[1] * m[4] - m[2] * m[3], m[0] * m[5] - m[2] * m[2],
+                                        m[1] * m[2] - m[0] * m[4], m[0] * m[3] - m[1] * m[1]};
   const double determinant = m[0] * cofactor[0] + m[1] * cofactor[1] + m[2] * cofactor[2];
-  SymmetricBlock result{};
+  linalg::SymmetricBlock result{};
   for (std::size_t k = 0; k < 6; ++k)
     result[k] = cofactor[k] / determinant;
   return result;
@@ -57,7 +57,7 @@ std::array<Vec3, 4> corner_gradients(const SolidElement& e, std::size_t a) {
     for (std::size_t p = 0; p < 4; ++p)
       result[p] = e.gradient[a] * (p == a ? 3.0 : -1.0);
   } else { // 4 λi λj
-    const auto [i, j] = tetrahedron_edges[a - 4];
+    const auto [i, j] = tetrahedra::tetrahedron_edges[a - 4];
     result[i] = e.gradient[j] * 4;
     result[j] = e.gradient[i] * 4;
   }
@@ -70,7 +70,7 @@ SolidBlock second_derivatives(const SolidElement& e, std::size_t a) {
   if (a < 4) {
     add_outer(result, e.gradient[a], e.gradient[a], 4);
   } else {
-    const auto [i, j] = tetrahedron_edges[a - 4];
+    const auto [i, j] = tetrahedra::tetrahedron_edges[a - 4];
     add_outer(result, e.gradient[i], e.gradient[j], 4);
     add_outer(result, e.gradient[j], e.gradient[i], 4);
   }
@@ -136,7 +136,7 @@ SolidElement solid_element(const std::array<Vec3, 4>& corners, const Elasticity&
   SolidBlock h{};
   for (const Vec3& g : e.gradient)
     add_outer(h, g, g, 1);
-  SymmetricBlock stiffness{};
+  linalg::SymmetricBlock stiffness{};
   for (std::size_t i = 0; i < 3; ++i)
     for (std::size_t j = i; j < 3; ++j)
       stiffness[entry[i][j]] = (material.mu + 3.0 / 7 * material.lambda) * h[3 * i + j] +
@@ -211,4 +211,4 @@ std::array<SolidBlock, 4> displacement_gradients(const SolidElement& element,
   return result;
 }
 
-} // namespace gewebe
+} // namespace gewebe::fem

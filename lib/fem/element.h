@@ -37,7 +37,7 @@
 #include <cstddef>
 #include <span>
 
-namespace gewebe {
+namespace gewebe::fem {
 
 /// Lamé's constants, Pa: stress = lambda tr(strain) I + 2 mu strain.
 struct Elasticity {
@@ -69,9 +69,10 @@ struct SolidElement {
   double volume = 0;              ///< mm³
   std::array<Vec3, 4> gradient{}; ///< of the barycentric coordinates, 1/mm
   Elasticity material;
-  SymmetricBlock bubble_flexibility{}; ///< (∫b)² times the inverse of the bubble's own stiffness
-  HyperelasticLaw law;                 ///< of large strains (fem/hyperelastic.h)
-  ElementMemory memory{};              ///< ... of the step that is open
+  linalg::SymmetricBlock
+      bubble_flexibility{};   ///< (∫b)² times the inverse of the bubble's own stiffness
+  model::HyperelasticLaw law; ///< of large strains (fem/hyperelastic.h)
+  ElementMemory memory{};     ///< ... of the step that is open
 };
 
 /// \throw Error unless the volume is finite and positive (as the corners are ordered)
@@ -97,4 +98,4 @@ std::array<SolidBlock, 4> displacement_gradients(const SolidElement& element,
                                                  std::span<const Vec3> u,
                                                  const Vec3& force_density = {});
 
-} // namespace gewebe
+} // namespace gewebe::fem

@@ -13,7 +13,7 @@
 #include <cmath>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::fem {
 
 namespace {
 
@@ -73,7 +73,7 @@ Gradients gradients_at(const SolidElement& e, const std::array<double, 4>& l, bo
   for (std::size_t a = 0; a < 4; ++a)
     g[a] = e.gradient[a] * (4 * l[a] - 1);
   for (std::size_t k = 0; k < 6; ++k) {
-    const auto [i, j] = tetrahedron_edges[k];
+    const auto [i, j] = tetrahedra::tetrahedron_edges[k];
     g[4 + k] = e.gradient[j] * (4 * l[i]) + e.gradient[i] * (4 * l[j]);
   }
   for (std::size_t k = 0; k < 4; ++k) {
@@ -180,7 +180,7 @@ void hyperelastic_response(const SolidElement& element, std::span<const Vec3> u,
   const std::size_t count = quadratic ? 11 : 4;
   const double mu = element.material.mu;
   const std::span<const IntegrationPoint> at = points_of(quadratic);
-  const HyperelasticLaw& law = element.law;
+  const model::HyperelasticLaw& law = element.law;
   const bool neo_hookean = is_neo_hookean(law) && !element.memory.acts(),
              wants_second = part >= HyperelasticPart::tangent;
   std::array<Point, 24> points;
@@ -405,7 +405,7 @@ private:
   }
 
   double mu_, constant_ = 0, energy_ = 0;
-  HyperelasticLaw law_;
+  model::HyperelasticLaw law_;
   ElementMemory memory_;
   bool neo_hookean_;
   LawResponse modified_;
@@ -489,4 +489,4 @@ void hyperelastic_body_load(const SolidElement& element, const Vec3& force_densi
   }
 }
 
-} // namespace gewebe
+} // namespace gewebe::fem

@@ -51,7 +51,7 @@
 #include <cstddef>
 #include <span>
 
-namespace gewebe {
+namespace gewebe::fem {
 
 /// Of one element under given displacements.
 struct HyperelasticResponse {
@@ -137,4 +137,4 @@ void point_states(const SolidElement& element, std::span<const Vec3> u, const Ve
 void hyperelastic_body_load(const SolidElement& element, const Vec3& force_density,
                             std::span<Vec3> force);
 
-} // namespace gewebe
+} // namespace gewebe::fem

@@ -8,7 +8,7 @@
 #include <cmath>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::fem {
 
 namespace {
 
@@ -75,7 +75,8 @@ bool read(const HyperelasticGroup& group, const HyperelasticGroupResult& result,
     const double product = result.product[k][lane];
     if (!(product > 0 && std::isfinite(product)))
       return false;
-    logarithms += group_points().weight[HyperelasticPoints::first[k]] * natural_logarithm(product);
+    logarithms +=
+        group_points().weight[HyperelasticPoints::first[k]] * numeric::natural_logarithm(product);
   }
   forces.energy =
       group.volume[lane] * (result.energy[lane] - 2.0 / 3 * group.mu[lane] * logarithms);
@@ -100,7 +101,7 @@ void hyperelastic_forces(std::span<const SolidElement> elements, std::size_t nod
   };
   const bool side_by_side =
       nodes == 10 && std::ranges::all_of(elements, [](const SolidElement& e) {
-        return e.law.kind == HyperelasticLaw::stable_neo_hookean && !e.memory.acts();
+        return e.law.kind == model::HyperelasticLaw::stable_neo_hookean && !e.memory.acts();
       });
   if (!side_by_side) {
     for (std::size_t t = 0; t < elements.size(); ++t)
@@ -120,4 +121,4 @@ void hyperelastic_forces(std::span<const SolidElement> elements, std::size_t nod
       alone(t);
 }
 
-} // namespace gewebe
+} // namespace gewebe::fem

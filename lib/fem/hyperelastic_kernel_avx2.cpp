@@ -1,6 +1,6 @@
 #include "fem/hyperelastic_kernel_body_internal.h"
 
-namespace gewebe {
+namespace gewebe::fem {
 
 void add_tangent_avx2(const TangentPoint& point, std::size_t count, TangentSums& sums) {
   add_tangent(point, count, sums);
@@ -11,4 +11,4 @@ void evaluate_group_avx2(const HyperelasticPoints& points, bool own, Hyperelasti
   evaluate_group(points, own, group, result);
 }
 
-} // namespace gewebe
+} // namespace gewebe::fem

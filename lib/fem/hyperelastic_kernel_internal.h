@@ -6,7 +6,7 @@
 #include <array>
 #include <cstddef>
 
-namespace gewebe {
+namespace gewebe::fem {
 
 /// Nodes of an element with its bubble, and room for a last group of four.
 inline constexpr std::size_t tangent_nodes = 11, tangent_lanes = 12;
@@ -60,4 +60,4 @@ void evaluate_group_baseline(const HyperelasticPoints& points, bool own, Hyperel
 void evaluate_group_avx2(const HyperelasticPoints& points, bool own, HyperelasticGroup& group,
                          HyperelasticGroupResult& result);
 
-} // namespace gewebe
+} // namespace gewebe::fem

@@ -4,7 +4,7 @@
 #include <array>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::fem {
 
 struct IntegrationPoint {
   std::array<double, 4> at{}; ///< barycentric
@@ -14,4 +14,4 @@ struct IntegrationPoint {
 /// 24 points, exact to degree 6: three classes of 4 with equal weights each, then one of 12.
 const std::vector<IntegrationPoint>& quadratic_points();
 
-} // namespace gewebe
+} // namespace gewebe::fem

@@ -5,7 +5,7 @@
 
 #include <Eigen/Core>
 
-namespace gewebe {
+namespace gewebe::fem {
 
 using Matrix3 = Eigen::Matrix<double, 3, 3, Eigen::RowMajor>;
 
@@ -13,4 +13,4 @@ inline Matrix3 matrix(const SolidBlock& block) {
   return Eigen::Map<const Matrix3>(block.data());
 }
 
-} // namespace gewebe
+} // namespace gewebe::fem

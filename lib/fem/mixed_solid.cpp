@@ -11,7 +11,7 @@
 #include <algorithm>
 #include <cmath>
 
-namespace gewebe {
+namespace gewebe::fem {
 
 namespace {
 
@@ -43,7 +43,7 @@ bool is_positive(const Eigen::Map<const FullMatrix>& k, Eigen::Index order) {
 
 } // namespace
 
-MixedSolid::MixedSolid(const TetMesh& mesh, std::span<const SolidElement> elements)
+MixedSolid::MixedSolid(const tetrahedra::TetMesh& mesh, std::span<const SolidElement> elements)
     : mesh_(mesh), elements_(elements), nodes_(solid_nodes(mesh)), parts_(elements.size()) {}
 
 std::array<Vec3, 10> MixedSolid::of_nodes(std::span<const double> v, std::size_t t) const {
@@ -137,8 +137,8 @@ double MixedSolid::linearise(std::span<const double> u, const MixedUnknowns& own
   return sum;
 }
 
-StiffnessMatrix MixedSolid::matrix(std::span<const std::uint8_t> held,
-                                   const Context& context) const {
+linalg::StiffnessMatrix MixedSolid::matrix(std::span<const std::uint8_t> held,
+                                           const Context& context) const {
   const auto block_of = [&](std::size_t t, std::size_t a, std::size_t b) {
     SolidBlock block{};
     for (std::size_t n = 0; n < 9; ++n)
@@ -249,4 +249,4 @@ MixedUnknowns MixedSolid::follow(std::span<const double> d, const Context& conte
   return change;
 }
 
-} // namespace gewebe
+} // namespace gewebe::fem

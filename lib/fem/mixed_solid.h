@@ -29,7 +29,7 @@
 #include <span>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::fem {
 
 /// What each element has beside its nodes.
 struct MixedUnknowns {
@@ -42,7 +42,7 @@ struct MixedUnknowns {
 class MixedSolid {
 public:
   /// Keeps references to both. \pre elements are those of the mesh, of laws without limits to F
-  MixedSolid(const TetMesh& mesh, std::span<const SolidElement> elements);
+  MixedSolid(const tetrahedra::TetMesh& mesh, std::span<const SolidElement> elements);
 
   /// Bubbles of least energy, sought from `start`, and the pressures that J makes.
   MixedUnknowns balanced(std::span<const double> u, std::span<const Vec3> start,
@@ -55,7 +55,7 @@ public:
   double linearise(std::span<const double> u, const MixedUnknowns& own, double positive,
                    const Context& context);
   /// The matrix of the nodes' free axes. \pre linearised
-  StiffnessMatrix matrix(std::span<const std::uint8_t> held, const Context& context) const;
+  linalg::StiffnessMatrix matrix(std::span<const std::uint8_t> held, const Context& context) const;
   /// The right-hand side of the last system at another shape. \return the energy there
   /// \pre linearised
   double evaluate(std::span<const double> u, const MixedUnknowns& own, const Context& context);
@@ -85,10 +85,10 @@ private:
                   const std::array<double, 4>& pressure);
   std::array<Vec3, 10> of_nodes(std::span<const double> v, std::size_t t) const;
 
-  const TetMesh& mesh_;
+  const tetrahedra::TetMesh& mesh_;
   std::span<const SolidElement> elements_;
   std::size_t nodes_;
   std::vector<Part> parts_;
 };
 
-} // namespace gewebe
+} // namespace gewebe::fem

@@ -5,11 +5,12 @@
 
 #include <cstddef>
 
-namespace gewebe {
+namespace gewebe::fem {
 namespace {
 
 /// Flags of all axes that can't move.
-std::vector<std::uint8_t> held_axes(const Model& model, std::span<const std::uint8_t> fixed) {
+std::vector<std::uint8_t> held_axes(const model::Model& model,
+                                    std::span<const std::uint8_t> fixed) {
   std::vector<std::uint8_t> held(fixed.begin(), fixed.end());
   held.resize(3 * model.nodes.size());
   for (std::size_t i = 0; i < model.nodes.size(); ++i)
@@ -21,19 +22,20 @@ std::vector<std::uint8_t> held_axes(const Model& model, std::span<const std::uin
 
 } // namespace
 
-StiffnessMatrix stiffness_matrix(const Model& model, std::span<const std::uint8_t> fixed,
-                                 const Context& context) {
+linalg::StiffnessMatrix stiffness_matrix(const model::Model& model,
+                                         std::span<const std::uint8_t> fixed,
+                                         const Context& context) {
   if (model.tetrahedra.empty())
-    return spring_stiffness(model, fixed);
-  const TetMesh mesh = element_mesh(model);
+    return linalg::spring_stiffness(model, fixed);
+  const tetrahedra::TetMesh mesh = element_mesh(model);
   const std::vector<SolidElement> elements =
       solid_elements(mesh, element_materials(model), context);
-  StiffnessMatrix solid = solid_stiffness(mesh, elements, held_axes(model, fixed), context);
-  return model.springs.empty() ? solid : sum(spring_stiffness(model, fixed), solid);
+  linalg::StiffnessMatrix solid = solid_stiffness(mesh, elements, held_axes(model, fixed), context);
+  return model.springs.empty() ? solid : sum(linalg::spring_stiffness(model, fixed), solid);
 }
 
-StiffnessOperator::StiffnessOperator(const Model& model, const Context& context)
-    : model_(model), springs_(stiffness_blocks(model)) {
+StiffnessOperator::StiffnessOperator(const model::Model& model, const Context& context)
+    : model_(model), springs_(linalg::stiffness_blocks(model)) {
   if (model.tetrahedra.empty())
     return;
   mesh_ = element_mesh(model);
@@ -41,7 +43,7 @@ StiffnessOperator::StiffnessOperator(const Model& model, const Context& context)
 }
 
 void StiffnessOperator::multiply(std::span<const double> u, std::span<double> f) const {
-  multiply_springs(model_, springs_, u, f);
+  linalg::multiply_springs(model_, springs_, u, f);
   if (elements_.empty())
     return;
   std::vector<double> solid(f.size());
@@ -50,11 +52,11 @@ void StiffnessOperator::multiply(std::span<const double> u, std::span<double> f)
     f[axis] += solid[axis];
 }
 
-std::vector<double> weight_of(const Model& model, const Vec3& acceleration) {
+std::vector<double> weight_of(const model::Model& model, const Vec3& acceleration) {
   std::vector<double> weight(3 * model.nodes.size()), lumped(model.nodes.size());
   // On linear elements the consistent load is that of the lumped masses.
   if (!model.middles.empty()) {
-    const TetMesh mesh = element_mesh(model);
+    const tetrahedra::TetMesh mesh = element_mesh(model);
     const std::vector<SolidMaterial> materials = element_materials(model);
     weight = gravity_load(mesh, materials, solid_elements(mesh, materials), acceleration);
     lumped = solid_masses(mesh, materials);
@@ -66,8 +68,8 @@ std::vector<double> weight_of(const Model& model, const Vec3& acceleration) {
   return weight;
 }
 
-void multiply_stiffness(const Model& model, std::span<const double> u, std::span<double> f) {
+void multiply_stiffness(const model::Model& model, std::span<const double> u, std::span<double> f) {
   StiffnessOperator(model).multiply(u, f);
 }
 
-} // namespace gewebe
+} // namespace gewebe::fem

@@ -10,7 +10,7 @@
 #include <cmath>
 #include <cstddef>
 
-namespace gewebe {
+namespace gewebe::fem {
 
 namespace {
 
@@ -25,7 +25,7 @@ struct Curve {
 };
 
 Curve power_curve(double x, double exponent) {
-  const double value = power(x, exponent);
+  const double value = numeric::power(x, exponent);
   return {value, exponent * value / x, exponent * (exponent - 1) * value / (x * x)};
 }
 
@@ -249,11 +249,11 @@ void add_cofactor_slope(const SolidBlock& f, double scale, SecondDerivative& m) 
         }
 }
 
-void modified_law(const HyperelasticLaw& law, double mu, const SolidBlock& f,
+void modified_law(const model::HyperelasticLaw& law, double mu, const SolidBlock& f,
                   const SolidBlock& cofactor, double j, bool wants_second, LawResponse& response) {
   Law sum(f, cofactor, j, wants_second, response);
   const auto& p = law.parameter;
-  if (law.kind == HyperelasticLaw::ogden) {
+  if (law.kind == model::HyperelasticLaw::ogden) {
     const auto add = [&](double alpha, double share) {
       sum.add(2 * mu * share / (alpha * alpha),
               sum.modified(sum.sum_of_powers(alpha), alpha > 0 ? -alpha / 3 : 2 * alpha / 3));
@@ -263,7 +263,7 @@ void modified_law(const HyperelasticLaw& law, double mu, const SolidBlock& f,
       add(p[1], p[2]);
   } else {
     const Invariant x = sum.modified(sum.first(), -2.0 / 3);
-    if (law.kind == HyperelasticLaw::yeoh) {
+    if (law.kind == model::HyperelasticLaw::yeoh) {
       const double by = x.value - 3, c10 = mu / 2, c20 = p[0] * mu, c30 = p[1] * mu;
       sum.add({by * (c10 + by * (c20 + by * c30)), c10 + by * (2 * c20 + 3 * by * c30),
                2 * c20 + 6 * by * c30},
@@ -277,26 +277,26 @@ void modified_law(const HyperelasticLaw& law, double mu, const SolidBlock& f,
   sum.add_common(mu);
 }
 
-bool is_neo_hookean(const HyperelasticLaw& law) {
-  return law.kind == HyperelasticLaw::stable_neo_hookean ||
-         law.kind == HyperelasticLaw::neo_hookean;
+bool is_neo_hookean(const model::HyperelasticLaw& law) {
+  return law.kind == model::HyperelasticLaw::stable_neo_hookean ||
+         law.kind == model::HyperelasticLaw::neo_hookean;
 }
 
-NeoHookeanLaw neo_hookean_law(const HyperelasticLaw& law, double mu, double i_c, double j) {
-  if (law.kind == HyperelasticLaw::neo_hookean) {
+NeoHookeanLaw neo_hookean_law(const model::HyperelasticLaw& law, double mu, double i_c, double j) {
+  if (law.kind == model::HyperelasticLaw::neo_hookean) {
     if (!(j > 0))
       return {.energy = HUGE_VAL};
-    return {mu / 2 * (i_c - 3) - mu * natural_logarithm(j), mu, 0, mu / (j * j), -mu / j};
+    return {mu / 2 * (i_c - 3) - mu * numeric::natural_logarithm(j), mu, 0, mu / (j * j), -mu / j};
   }
   const double shear = 2.0 / 3 * mu, below = i_c + 1;
-  return {shear * (i_c - 3) - shear * natural_logarithm(below / 4) - mu * (j - 1) +
+  return {shear * (i_c - 3) - shear * numeric::natural_logarithm(below / 4) - mu * (j - 1) +
               5.0 / 12 * mu * (j - 1) * (j - 1),
           2 * shear * (1 - 1 / below), 4 * shear / (below * below), 5.0 / 6 * mu,
           -mu + 5.0 / 6 * mu * (j - 1)};
 }
 
-void law_at(const HyperelasticLaw& law, double mu, const SolidBlock& f, const SolidBlock& cofactor,
-            double j, bool wants_second, LawResponse& response) {
+void law_at(const model::HyperelasticLaw& law, double mu, const SolidBlock& f,
+            const SolidBlock& cofactor, double j, bool wants_second, LawResponse& response) {
   if (!is_neo_hookean(law)) {
     modified_law(law, mu, f, cofactor, j, wants_second, response);
     return;
@@ -337,4 +337,4 @@ void remember(const ElementMemory& memory, std::size_t n, double mu, const Solid
     response.second.block<3, 3>(3 * i, 3 * i) += a;
 }
 
-} // namespace gewebe
+} // namespace gewebe::fem

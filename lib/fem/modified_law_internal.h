@@ -8,7 +8,7 @@
 
 #include <cstddef>
 
-namespace gewebe {
+namespace gewebe::fem {
 
 /// A second derivative by F: rows and columns 3 i + j of F_ij.
 using SecondDerivative = Eigen::Matrix<double, 9, 9>;
@@ -21,7 +21,7 @@ struct LawResponse {
 
 /// W of fem/hyperelastic.h without its projected part, of a Mooney-Rivlin, Yeoh or Ogden material.
 /// \param cofactor  dJ/dF
-void modified_law(const HyperelasticLaw& law, double mu, const SolidBlock& f,
+void modified_law(const model::HyperelasticLaw& law, double mu, const SolidBlock& f,
                   const SolidBlock& cofactor, double j, bool wants_second, LawResponse& response);
 
 /// Of Neo-Hookean laws dW/dF = a F + d cof F and d²W/dF² = a 1 + b F ⊗ F + c cof F ⊗ cof F + d
@@ -31,13 +31,13 @@ struct NeoHookeanLaw {
 };
 
 /// Both forms of it.
-bool is_neo_hookean(const HyperelasticLaw& law);
+bool is_neo_hookean(const model::HyperelasticLaw& law);
 /// \pre is_neo_hookean(law)
-NeoHookeanLaw neo_hookean_law(const HyperelasticLaw& law, double mu, double i_c, double j);
+NeoHookeanLaw neo_hookean_law(const model::HyperelasticLaw& law, double mu, double i_c, double j);
 
 /// W without its projected part, of any law.
-void law_at(const HyperelasticLaw& law, double mu, const SolidBlock& f, const SolidBlock& cofactor,
-            double j, bool wants_second, LawResponse& response);
+void law_at(const model::HyperelasticLaw& law, double mu, const SolidBlock& f,
+            const SolidBlock& cofactor, double j, bool wants_second, LawResponse& response);
 
 /// The same of a viscoelastic element, at its point n. \param response  of the law alone, becomes
 /// that with the memory
@@ -47,4 +47,4 @@ void remember(const ElementMemory& memory, std::size_t n, double mu, const Solid
 /// m += scale d²J/dF².
 void add_cofactor_slope(const SolidBlock& f, double scale, SecondDerivative& m);
 
-} // namespace gewebe
+} // namespace gewebe::fem

@@ -8,15 +8,15 @@
 #include <cstdint>
 #include <utility>
 
-namespace gewebe {
+namespace gewebe::fem {
 namespace {
 
-void drop_unused(TetMesh& mesh, const NodeOrder& order) {
+void drop_unused(tetrahedra::TetMesh& mesh, const tetrahedra::NodeOrder& order) {
   mesh.points.resize(mesh.points.size() - order.unused);
 }
 
 /// The triangles of the boundary; each as four where it has middles.
-std::vector<Triangle> surface_triangles(const TetBoundary& surface) {
+std::vector<Triangle> surface_triangles(const tetrahedra::TetBoundary& surface) {
   std::vector<Triangle> triangles;
   triangles.reserve((surface.middles.empty() ? 1 : 4) * surface.mesh.triangles.size());
   for (std::size_t t = 0; t < surface.mesh.triangles.size(); ++t) {
@@ -35,7 +35,7 @@ std::vector<Triangle> surface_triangles(const TetBoundary& surface) {
 }
 
 /// Normals of the surface's nodes; 0 for all other nodes.
-std::vector<Vec3> surface_normals(const Model& model) {
+std::vector<Vec3> surface_normals(const model::Model& model) {
   std::vector<Vec3> normals(model.nodes.size());
   for (const auto& [a, b, c] : model.triangles) {
     const Vec3 &p = model.nodes[a].position, &q = model.nodes[b].position,
@@ -52,23 +52,24 @@ std::vector<Vec3> surface_normals(const Model& model) {
 
 } // namespace
 
-Model solid_model(TetMesh mesh, const SolidModelOptions& options, const Context& context) {
+model::Model solid_model(tetrahedra::TetMesh mesh, const SolidModelOptions& options,
+                         const Context& context) {
   if (!options.quadratic && !mesh.middles.empty())
     throw Error("the mesh has quadratic elements, expected linear ones");
   if (options.quadratic && mesh.middles.empty())
-    make_quadratic(mesh);
-  drop_unused(mesh, order_nodes(mesh));
-  Model model;
+    tetrahedra::make_quadratic(mesh);
+  drop_unused(mesh, tetrahedra::order_nodes(mesh));
+  model::Model model;
   model.materials = options.material.materials;
   model.name = model.materials.at(0).name;
   model.tetrahedron_material.reserve(mesh.tetrahedra.size());
   for (std::size_t t = 0; t < mesh.tetrahedra.size(); ++t)
     model.tetrahedron_material.push_back(
-        chosen_material(options.material, mesh.material.empty() ? 0 : mesh.material[t]));
+        model::chosen_material(options.material, mesh.material.empty() ? 0 : mesh.material[t]));
   mesh.material = model.tetrahedron_material;
   model.tetrahedra = mesh.tetrahedra;
   model.middles = mesh.middles;
-  model.triangles = surface_triangles(boundary(mesh));
+  model.triangles = surface_triangles(tetrahedra::boundary(mesh));
 
   model.nodes.resize(mesh.points.size());
   for (std::size_t n = 0; n < model.nodes.size(); ++n) {
@@ -98,10 +99,10 @@ Model solid_model(TetMesh mesh, const SolidModelOptions& options, const Context&
   return model;
 }
 
-TetMesh element_mesh(const Model& model) {
-  TetMesh mesh;
+tetrahedra::TetMesh element_mesh(const model::Model& model) {
+  tetrahedra::TetMesh mesh;
   mesh.points.reserve(model.nodes.size());
-  for (const Node& node : model.nodes)
+  for (const model::Node& node : model.nodes)
     mesh.points.push_back(node.position);
   mesh.tetrahedra = model.tetrahedra;
   mesh.middles = model.middles;
@@ -109,19 +110,19 @@ TetMesh element_mesh(const Model& model) {
   return mesh;
 }
 
-std::vector<SolidMaterial> element_materials(const Model& model) {
+std::vector<SolidMaterial> element_materials(const model::Model& model) {
   std::vector<SolidMaterial> materials(model.materials.size());
   std::vector<std::uint8_t> used(model.materials.size());
   for (const std::int32_t m : model.tetrahedron_material)
     used[static_cast<std::size_t>(m)] = 1;
   for (std::size_t m = 0; m < materials.size(); ++m) {
-    const Material& of = model.materials[m];
+    const model::Material& of = model.materials[m];
     if (used[m] != 0 && !of.poisson)
       throw Error("the material '" + of.name + "' has no Poisson's ratio, expected one");
     materials[m] = {of.young, of.poisson.value_or(0), of.density,
-                    of.law.value_or(HyperelasticLaw{}), of.prony};
+                    of.law.value_or(model::HyperelasticLaw{}), of.prony};
   }
   return materials;
 }
 
-} // namespace gewebe
+} // namespace gewebe::fem

@@ -9,10 +9,11 @@
 
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::fem {
 
 struct SolidModelOptions {
-  MaterialChoice material{{material_presets()[0]}, {}}; ///< part p: tetrahedra of material p
+  model::MaterialChoice material{{model::material_presets()[0]},
+                                 {}}; ///< part p: tetrahedra of material p
   bool quadratic = true;
   double drag_rate = 1; ///< drag of a node per mass, 1/s
   bool normals = false; ///< area-weighted, of the surface; 0 inside
@@ -26,13 +27,14 @@ struct SolidModelOptions {
 /// No springs, no central nodes. \pre check_mesh(mesh) passes, require_sound() too
 /// \throw Error if the mesh is quadratic and the options are not, a middle is away from its edge's,
 /// a material has no Poisson's ratio, or there are too many nodes; Cancelled
-Model solid_model(TetMesh mesh, const SolidModelOptions& options, const Context& context);
+model::Model solid_model(tetrahedra::TetMesh mesh, const SolidModelOptions& options,
+                         const Context& context);
 
 /// The elements of a model as a mesh whose points are its nodes, all of them.
-TetMesh element_mesh(const Model& model);
+tetrahedra::TetMesh element_mesh(const model::Model& model);
 /// A material without a law is stable Neo-Hookean under large strains. Prony series stay those of
 /// the model, which outlives the result.
 /// \pre check_model(model) passes, each material that an element has has a Poisson's ratio
-std::vector<SolidMaterial> element_materials(const Model& model);
+std::vector<SolidMaterial> element_materials(const model::Model& model);
 
-} // namespace gewebe
+} // namespace gewebe::fem

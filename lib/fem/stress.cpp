@@ -8,11 +8,11 @@
 #include <cmath>
 #include <cstddef>
 
-namespace gewebe {
+namespace gewebe::fem {
 
 namespace {
 
-SymmetricBlock symmetric_part(const SolidBlock& g) {
+linalg::SymmetricBlock symmetric_part(const SolidBlock& g) {
   return {g[0], (g[1] + g[3]) / 2, (g[2] + g[6]) / 2, g[4], (g[5] + g[7]) / 2, g[8]};
 }
 
@@ -28,7 +28,7 @@ Eigen::Matrix3d rotation_by(const Eigen::Vector3d& w) {
   return Eigen::AngleAxisd(angle, w / angle).toRotationMatrix();
 }
 
-SymmetricBlock turned(const SymmetricBlock& s, const Eigen::Matrix3d& r) {
+linalg::SymmetricBlock turned(const linalg::SymmetricBlock& s, const Eigen::Matrix3d& r) {
   Eigen::Matrix3d m;
   m << s[0], s[1], s[2], s[1], s[3], s[4], s[2], s[4], s[5];
   m = (r * m * r.transpose()).eval();
@@ -45,7 +45,7 @@ Vec3 at_node(std::span<const double> u, std::uint32_t node) {
 namespace {
 
 /// The rotation nearest to each element's gradient.
-std::vector<Eigen::Matrix3d> element_rotations(const TetMesh& mesh,
+std::vector<Eigen::Matrix3d> element_rotations(const tetrahedra::TetMesh& mesh,
                                                std::span<const SolidElement> elements,
                                                std::span<const double> u) {
   std::vector<double> places, forces(u.size());
@@ -66,7 +66,7 @@ std::vector<Eigen::Matrix3d> element_rotations(const TetMesh& mesh,
 }
 
 /// What displacements are in the frame of an element that turns by r about its first corner.
-void turn_back(const TetMesh& mesh, std::size_t t, const Eigen::Matrix3d& r,
+void turn_back(const tetrahedra::TetMesh& mesh, std::size_t t, const Eigen::Matrix3d& r,
                std::span<Vec3> values) {
   const Vec3 from = mesh.points[mesh.tetrahedra[t][0]], moved = values[0];
   for (std::size_t a = 0; a < values.size(); ++a) {
@@ -84,7 +84,7 @@ Vec3 turned_back(const Eigen::Matrix3d& r, const Vec3& v) {
 
 } // namespace
 
-std::vector<CornerTensors> solid_strains(const TetMesh& mesh,
+std::vector<CornerTensors> solid_strains(const tetrahedra::TetMesh& mesh,
                                          std::span<const SolidMaterial> materials,
                                          std::span<const SolidElement> elements,
                                          std::span<const double> u, const Vec3& acceleration,
@@ -131,7 +131,7 @@ std::vector<CornerTensors> solid_stresses(std::span<const SolidElement> elements
   std::vector<CornerTensors> stresses(elements.size());
   for (std::size_t t = 0; t < elements.size(); ++t)
     for (std::size_t p = 0; p < 4; ++p) {
-      const SymmetricBlock& strain = strains[t][p];
+      const linalg::SymmetricBlock& strain = strains[t][p];
       const double volumetric = elements[t].material.lambda * (strain[0] + strain[3] + strain[5]);
       for (std::size_t k = 0; k < 6; ++k)
         stresses[t][p][k] =
@@ -140,20 +140,21 @@ std::vector<CornerTensors> solid_stresses(std::span<const SolidElement> elements
   return stresses;
 }
 
-SymmetricBlock tensor_at(const CornerTensors& tensors, const std::array<double, 4>& coordinates) {
-  SymmetricBlock result{};
+linalg::SymmetricBlock tensor_at(const CornerTensors& tensors,
+                                 const std::array<double, 4>& coordinates) {
+  linalg::SymmetricBlock result{};
   for (std::size_t p = 0; p < 4; ++p)
     for (std::size_t k = 0; k < 6; ++k)
       result[k] += coordinates[p] * tensors[p][k];
   return result;
 }
 
-std::vector<SymmetricBlock> nodal_tensors(const TetMesh& mesh,
-                                          std::span<const SolidElement> elements,
-                                          std::span<const CornerTensors> tensors) {
-  std::vector<SymmetricBlock> sums(mesh.points.size());
+std::vector<linalg::SymmetricBlock> nodal_tensors(const tetrahedra::TetMesh& mesh,
+                                                  std::span<const SolidElement> elements,
+                                                  std::span<const CornerTensors> tensors) {
+  std::vector<linalg::SymmetricBlock> sums(mesh.points.size());
   std::vector<double> volumes(mesh.points.size());
-  const auto add = [&](std::uint32_t node, std::size_t t, const SymmetricBlock& tensor) {
+  const auto add = [&](std::uint32_t node, std::size_t t, const linalg::SymmetricBlock& tensor) {
     volumes[node] += elements[t].volume;
     for (std::size_t k = 0; k < 6; ++k)
       sums[node][k] += elements[t].volume * tensor[k];
@@ -165,7 +166,7 @@ std::vector<SymmetricBlock> nodal_tensors(const TetMesh& mesh,
       continue;
     for (std::size_t k = 0; k < 6; ++k) {
       std::array<double, 4> coordinates{};
-      for (const std::size_t end : tetrahedron_edges[k])
+      for (const std::size_t end : tetrahedra::tetrahedron_edges[k])
         coordinates[end] = 0.5;
       add(mesh.middles[t][k], t, tensor_at(tensors[t], coordinates));
     }
@@ -176,7 +177,7 @@ std::vector<SymmetricBlock> nodal_tensors(const TetMesh& mesh,
   return sums;
 }
 
-double von_mises(const SymmetricBlock& stress) {
+double von_mises(const linalg::SymmetricBlock& stress) {
   const auto& [xx, xy, xz, yy, yz, zz] = stress;
   const double a = xx - yy, b = yy - zz, c = zz - xx;
   return std::sqrt((a * a + b * b + c * c) / 2 + 3 * (xy * xy + yz * yz + xz * xz));
@@ -184,8 +185,8 @@ double von_mises(const SymmetricBlock& stress) {
 
 namespace {
 
-std::vector<SymmetricBlock> in_the_middle(std::span<const CornerTensors> tensors) {
-  std::vector<SymmetricBlock> result;
+std::vector<linalg::SymmetricBlock> in_the_middle(std::span<const CornerTensors> tensors) {
+  std::vector<linalg::SymmetricBlock> result;
   result.reserve(tensors.size());
   for (const CornerTensors& of : tensors)
     result.push_back(tensor_at(of, {0.25, 0.25, 0.25, 0.25}));
@@ -194,7 +195,7 @@ std::vector<SymmetricBlock> in_the_middle(std::span<const CornerTensors> tensors
 
 } // namespace
 
-SolidFields solid_fields(const TetMesh& mesh, std::span<const SolidMaterial> materials,
+SolidFields solid_fields(const tetrahedra::TetMesh& mesh, std::span<const SolidMaterial> materials,
                          std::span<const SolidElement> elements, std::span<const double> u,
                          const Vec3& acceleration, StrainFrames frames) {
   const std::vector<CornerTensors> strains =
@@ -204,4 +205,4 @@ SolidFields solid_fields(const TetMesh& mesh, std::span<const SolidMaterial> mat
           nodal_tensors(mesh, elements, stresses)};
 }
 
-} // namespace gewebe
+} // namespace gewebe::fem

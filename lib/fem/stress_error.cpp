@@ -9,7 +9,7 @@
 #include <cmath>
 #include <cstddef>
 
-namespace gewebe {
+namespace gewebe::fem {
 
 namespace {
 
@@ -75,7 +75,7 @@ struct Stars {
   std::vector<std::size_t> first;
   std::vector<std::uint32_t> element;
 
-  explicit Stars(const TetMesh& mesh) : first(mesh.points.size() + 1) {
+  explicit Stars(const tetrahedra::TetMesh& mesh) : first(mesh.points.size() + 1) {
     for (const Tetrahedron& t : mesh.tetrahedra)
       for (const std::uint32_t corner : t)
         ++first[corner + 1];
@@ -95,13 +95,13 @@ struct Stars {
 /// Recovered stress at the nodes of an element: its corners, and its middles by both ends of their
 /// edges, whose mean counts. Each has one patch that it comes from.
 struct Recovered {
-  std::array<SymmetricBlock, 4> corner{};
-  std::array<std::array<SymmetricBlock, 2>, 6> middle{};
+  std::array<linalg::SymmetricBlock, 4> corner{};
+  std::array<std::array<linalg::SymmetricBlock, 2>, 6> middle{};
 };
 
 class Recovery {
 public:
-  Recovery(const TetMesh& mesh, std::span<const CornerTensors> stresses)
+  Recovery(const tetrahedra::TetMesh& mesh, std::span<const CornerTensors> stresses)
       : mesh_(mesh), stresses_(stresses), stars_(mesh), quadratic_(!mesh.middles.empty()),
         samples_(sampling_points(quadratic_)), recovered_(mesh.tetrahedra.size()) {}
 
@@ -156,9 +156,9 @@ private:
     double size = 0; ///< of the patch, mm
     Matrix<double, terms, 6> coefficients;
 
-    SymmetricBlock operator()(const Vec3& p) const {
+    linalg::SymmetricBlock operator()(const Vec3& p) const {
       const Vec3 x = (p - centre) / size;
-      SymmetricBlock value{};
+      linalg::SymmetricBlock value{};
       for (std::size_t k = 0; k < 6; ++k) {
         const auto c = coefficients.col(static_cast<Index>(k));
         value[k] = c[0] + c[1] * x.x + c[2] * x.y + c[3] * x.z;
@@ -184,7 +184,7 @@ private:
           x += sample[k] * mesh_.points[mesh_.tetrahedra[t][k]];
         x = x / result.size;
         places.row(r) << 1, x.x, x.y, x.z;
-        const SymmetricBlock stress = tensor_at(stresses_[t], sample);
+        const linalg::SymmetricBlock stress = tensor_at(stresses_[t], sample);
         values.row(r) = Eigen::Map<const Matrix<double, 1, 6>>(stress.data());
         ++r;
       }
@@ -198,7 +198,7 @@ private:
   /// Keeps the values at the places of the node in the elements around it, which are its own: no
   /// two nodes have the same.
   void keep(std::uint32_t node, std::int32_t of, const Fit& fit) {
-    const SymmetricBlock here = fit(mesh_.points[node]);
+    const linalg::SymmetricBlock here = fit(mesh_.points[node]);
     for (const std::uint32_t t : stars_.of(node)) {
       if (material(t) != of)
         continue;
@@ -207,12 +207,12 @@ private:
           recovered_[t].corner[a] = here;
       for (std::size_t k = 0; quadratic_ && k < 6; ++k)
         for (std::size_t end = 0; end < 2; ++end)
-          if (mesh_.tetrahedra[t][tetrahedron_edges[k][end]] == node)
+          if (mesh_.tetrahedra[t][tetrahedra::tetrahedron_edges[k][end]] == node)
             recovered_[t].middle[k][end] = fit(mesh_.points[mesh_.middles[t][k]]);
     }
   }
 
-  const TetMesh& mesh_;
+  const tetrahedra::TetMesh& mesh_;
   std::span<const CornerTensors> stresses_;
   Stars stars_;
   bool quadratic_;
@@ -221,33 +221,33 @@ private:
 };
 
 /// s : C⁻¹ : s of an isotropic material.
-double complementary(const Elasticity& material, const SymmetricBlock& s) {
+double complementary(const Elasticity& material, const linalg::SymmetricBlock& s) {
   const double bulk = material.lambda + 2 * material.mu / 3, p = (s[0] + s[3] + s[5]) / 3;
   const double size = von_mises(s); // 3/2 of the square of the deviator
   return size * size / (3 * material.mu) + p * p / bulk;
 }
 
 /// Recovered minus element stress at a point of an element.
-SymmetricBlock difference_at(const Recovered& recovered, const CornerTensors& stresses,
-                             const std::array<double, 4>& l, bool quadratic) {
-  SymmetricBlock d = tensor_at(stresses, l);
+linalg::SymmetricBlock difference_at(const Recovered& recovered, const CornerTensors& stresses,
+                                     const std::array<double, 4>& l, bool quadratic) {
+  linalg::SymmetricBlock d = tensor_at(stresses, l);
   for (double& value : d)
     value = -value;
-  const auto add = [&](double weight, const SymmetricBlock& tensor) {
+  const auto add = [&](double weight, const linalg::SymmetricBlock& tensor) {
     for (std::size_t k = 0; k < 6; ++k)
       d[k] += weight * tensor[k];
   };
   for (std::size_t a = 0; a < 4; ++a)
     add(quadratic ? l[a] * (2 * l[a] - 1) : l[a], recovered.corner[a]);
   for (std::size_t k = 0; quadratic && k < 6; ++k)
-    for (const SymmetricBlock& end : recovered.middle[k])
-      add(2 * l[tetrahedron_edges[k][0]] * l[tetrahedron_edges[k][1]], end);
+    for (const linalg::SymmetricBlock& end : recovered.middle[k])
+      add(2 * l[tetrahedra::tetrahedron_edges[k][0]] * l[tetrahedra::tetrahedron_edges[k][1]], end);
   return d;
 }
 
 } // namespace
 
-StressError stress_error(const TetMesh& mesh, std::span<const SolidElement> elements,
+StressError stress_error(const tetrahedra::TetMesh& mesh, std::span<const SolidElement> elements,
                          std::span<const CornerTensors> stresses, const Context& context) {
   static const std::array<Point, point_count> points = make_points();
   const std::vector<Recovered> recovered = Recovery(mesh, stresses).run(context);
@@ -259,7 +259,8 @@ StressError stress_error(const TetMesh& mesh, std::span<const SolidElement> elem
   for (std::size_t t = 0; t < elements.size(); ++t) {
     double square = 0;
     for (const Point& point : points) {
-      const SymmetricBlock d = difference_at(recovered[t], stresses[t], point.at, quadratic);
+      const linalg::SymmetricBlock d =
+          difference_at(recovered[t], stresses[t], point.at, quadratic);
       const double size = von_mises(d);
       square += point.weight * size * size;
       error.energy[t] += point.weight * complementary(elements[t].material, d);
@@ -276,4 +277,4 @@ StressError stress_error(const TetMesh& mesh, std::span<const SolidElement> elem
   return error;
 }
 
-} // namespace gewebe
+} // namespace gewebe::fem

@@ -22,7 +22,7 @@
 #include <span>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::fem {
 
 struct StressError {
   std::vector<double> energy; ///< ||e||² by element, 1e-9 J
@@ -41,7 +41,7 @@ struct DiscretisationError {
 
 /// \param stresses  of solid_stresses(), one per element \pre elements are those of the mesh
 /// The same bytes for any number of threads.
-StressError stress_error(const TetMesh& mesh, std::span<const SolidElement> elements,
+StressError stress_error(const tetrahedra::TetMesh& mesh, std::span<const SolidElement> elements,
                          std::span<const CornerTensors> stresses, const Context& context = {});
 
-} // namespace gewebe
+} // namespace gewebe::fem

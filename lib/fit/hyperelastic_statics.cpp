@@ -15,7 +15,7 @@
 #include <string>
 #include <utility>
 
-namespace gewebe {
+namespace gewebe::fit {
 
 namespace {
 
@@ -26,10 +26,11 @@ struct ElementDisplacement {
   Vec3 bubble;
 };
 
-ElementDisplacement of_element(const TetMesh& mesh, const SolidVector& v, std::size_t t) {
+ElementDisplacement of_element(const tetrahedra::TetMesh& mesh, const SolidVector& v,
+                               std::size_t t) {
   ElementDisplacement result;
-  for (std::size_t a = 0; a < solid_nodes(mesh); ++a) {
-    const std::size_t axis = 3 * std::size_t{solid_node(mesh, t, a)};
+  for (std::size_t a = 0; a < fem::solid_nodes(mesh); ++a) {
+    const std::size_t axis = 3 * std::size_t{fem::solid_node(mesh, t, a)};
     result.nodes[a] = {v.axes[axis], v.axes[axis + 1], v.axes[axis + 2]};
   }
   if (!mesh.middles.empty() && !v.bubbles.empty())
@@ -71,12 +72,12 @@ struct Linearised {
 
 class Newton {
 public:
-  Newton(const TetMesh& mesh, std::span<const SolidElement> elements,
+  Newton(const tetrahedra::TetMesh& mesh, std::span<const fem::SolidElement> elements,
          std::span<const std::uint8_t> fixed, const HyperelasticOptions& options,
          const Context& context)
       : mesh_(mesh), elements_(elements), fixed_(fixed), options_(options), context_(context),
         of_element_(elements.size()) {
-    for (const SolidElement& e : elements) {
+    for (const fem::SolidElement& e : elements) {
       rounding_ += 1e-14 * e.material.mu * e.volume;
       const double stiffness = (e.material.lambda + 2 * e.material.mu) * e.volume;
       for (const Vec3& g : e.gradient)
@@ -89,7 +90,7 @@ public:
   bool step(const SolidVector& load, const std::vector<double>& by, HyperelasticState& state) {
     bool prescribes = std::ranges::any_of(by, [](double d) { return d != 0; });
     for (int round = 0; round < options_.max_rounds; ++round) {
-      HyperelasticPart part = HyperelasticPart::tangent;
+      fem::HyperelasticPart part = fem::HyperelasticPart::tangent;
       bool definite = linearise(load, state.displacement, part);
       if (!std::isfinite(residual_))
         return false;
@@ -100,7 +101,7 @@ public:
       SolidVector direction;
       definite = definite && solve(prescribes ? by : std::vector<double>{}, direction);
       if (!definite || (!prescribes && !(product(unbalanced_, direction) > 0))) {
-        part = HyperelasticPart::positive_tangent;
+        part = fem::HyperelasticPart::positive_tangent;
         ++state.rounds;
         if (!linearise(load, state.displacement, part) ||
             !solve(prescribes ? by : std::vector<double>{}, direction))
@@ -110,7 +111,7 @@ public:
         prescribes = false; // the whole displacement at once; the caller takes a part of it where
                             // no balance is found
         state.displacement = moved(std::move(state.displacement), direction, 1);
-      } else if (!go(load, direction, part == HyperelasticPart::tangent, state.displacement)) {
+      } else if (!go(load, direction, part == fem::HyperelasticPart::tangent, state.displacement)) {
         return false;
       }
     }
@@ -122,7 +123,7 @@ public:
                std::vector<std::vector<double>>& moves) {
     const SolidVector none{std::vector<double>(fixed_.size()), {}};
     SolidVector direction;
-    if (!linearise(none, at, HyperelasticPart::tangent) || !solve({}, direction))
+    if (!linearise(none, at, fem::HyperelasticPart::tangent) || !solve({}, direction))
       return false;
     for (const SolidVector& change : changes) {
       condensed_ = change.axes;
@@ -135,23 +136,23 @@ public:
           condensed_[axis_of(t, a)] -= handed[static_cast<Eigen::Index>(a)];
       }
       std::vector<double>& u = moves.emplace_back(fixed_.size());
-      solve_axes(*matrix_, *factor_, condensed_, u);
+      linalg::solve_axes(*matrix_, *factor_, condensed_, u);
     }
     return true;
   }
 
 private:
   /// Fills of_element_, unbalanced_ and residual_. False if a bubble isn't stable.
-  bool linearise(const SolidVector& load, const SolidVector& at, HyperelasticPart part) {
-    const std::size_t count = solid_nodes(mesh_);
+  bool linearise(const SolidVector& load, const SolidVector& at, fem::HyperelasticPart part) {
+    const std::size_t count = fem::solid_nodes(mesh_);
     const auto order = static_cast<Eigen::Index>(3 * count);
     std::vector<std::uint8_t> stable(elements_.size(), 1);
     parallel_blocks(context_, elements_.size(), grain, [&](std::size_t begin, std::size_t end) {
-      HyperelasticResponse response;
+      fem::HyperelasticResponse response;
       for (std::size_t t = begin; t < end; ++t) {
         const ElementDisplacement u = of_element(mesh_, at, t);
-        hyperelastic_response(elements_[t], std::span(u.nodes).first(count), u.bubble, part,
-                              response);
+        fem::hyperelastic_response(elements_[t], std::span(u.nodes).first(count), u.bubble, part,
+                                   response);
         Linearised& e = of_element_[t];
         e.magnitude = response.energy == HUGE_VAL ? HUGE_VAL : 0;
         for (std::size_t a = 0; a < count; ++a) {
@@ -191,7 +192,7 @@ private:
       }
       for (std::size_t a = 0; a < count; ++a)
         for (std::size_t i = 0; i < 3; ++i) {
-          const std::size_t axis = 3 * std::size_t{solid_node(mesh_, t, a)} + i;
+          const std::size_t axis = 3 * std::size_t{fem::solid_node(mesh_, t, a)} + i;
           unbalanced_.axes[axis] += e.force[a][static_cast<int>(i)];
           condensed_[axis] +=
               e.force[a][static_cast<int>(i)] - handed[static_cast<Eigen::Index>(3 * a + i)];
@@ -211,11 +212,11 @@ private:
   /// Newton's step, with displacements on fixed axes changed by `by` (or not, if empty). False if
   /// the tangent isn't definite.
   bool solve(const std::vector<double>& by, SolidVector& direction) {
-    const std::size_t count = solid_nodes(mesh_);
-    matrix_ = assembled_matrix(
+    const std::size_t count = fem::solid_nodes(mesh_);
+    matrix_ = fem::assembled_matrix(
         mesh_,
         [&](std::size_t t, std::size_t a, std::size_t b) {
-          SolidBlock block;
+          fem::SolidBlock block;
           for (std::size_t n = 0; n < 9; ++n)
             block[n] = of_element_[t].tangent[3 * count * (3 * a + n / 3) + 3 * b + n % 3];
           return block;
@@ -226,7 +227,7 @@ private:
         factor_->refactor(*matrix_, context_);
       else
         factor_.emplace(*matrix_, context_);
-    } catch (const NotPositiveDefinite&) {
+    } catch (const linalg::NotPositiveDefinite&) {
       factor_.reset();
       return false;
     }
@@ -236,7 +237,7 @@ private:
         for (std::size_t b = 0; b < 3 * count; ++b)
           rest[axis_of(t, a)] -= of_element_[t].tangent[3 * count * a + b] * by[axis_of(t, b)];
     direction.axes.assign(fixed_.size(), 0);
-    solve_axes(*matrix_, *factor_, rest, direction.axes);
+    linalg::solve_axes(*matrix_, *factor_, rest, direction.axes);
     for (std::size_t axis = 0; !by.empty() && axis < fixed_.size(); ++axis)
       direction.axes[axis] += by[axis];
     direction.bubbles.assign(unbalanced_.bubbles.size(), {});
@@ -254,7 +255,7 @@ private:
   }
 
   std::size_t axis_of(std::size_t t, std::size_t a) const {
-    return 3 * std::size_t{solid_node(mesh_, t, a / 3)} + a % 3;
+    return 3 * std::size_t{fem::solid_node(mesh_, t, a / 3)} + a % 3;
   }
 
   /// All of the direction if `whole` is right; otherwise as much as the energy falls by (Armijo) or
@@ -280,8 +281,8 @@ private:
     return false;
   }
 
-  const TetMesh& mesh_;
-  std::span<const SolidElement> elements_;
+  const tetrahedra::TetMesh& mesh_;
+  std::span<const fem::SolidElement> elements_;
   std::span<const std::uint8_t> fixed_;
   const HyperelasticOptions& options_;
   const Context& context_;
@@ -289,27 +290,29 @@ private:
   SolidVector unbalanced_;        ///< forces, 0 on fixed axes
   std::vector<double> condensed_; ///< with what the bubbles hand on
   double residual_ = 0;
-  double rounding_ = 0;                   ///< of energies
-  double force_rounding_ = 0;             ///< of forces, squared
-  std::optional<StiffnessMatrix> matrix_; ///< the last tangent
-  std::optional<Factor> factor_;
+  double rounding_ = 0;                           ///< of energies
+  double force_rounding_ = 0;                     ///< of forces, squared
+  std::optional<linalg::StiffnessMatrix> matrix_; ///< the last tangent
+  std::optional<linalg::Factor> factor_;
 };
 
 } // namespace
 
-SolidVector hyperelastic_weight(const TetMesh& mesh, std::span<const SolidMaterial> materials,
-                                std::span<const SolidElement> elements, const Vec3& acceleration) {
+SolidVector hyperelastic_weight(const tetrahedra::TetMesh& mesh,
+                                std::span<const fem::SolidMaterial> materials,
+                                std::span<const fem::SolidElement> elements,
+                                const Vec3& acceleration) {
   SolidVector load{std::vector<double>(3 * mesh.points.size()), {}};
-  const std::size_t count = solid_nodes(mesh);
+  const std::size_t count = fem::solid_nodes(mesh);
   load.bubbles.resize(count == 4 ? 0 : elements.size());
   std::array<Vec3, 11> force;
   for (std::size_t t = 0; t < elements.size(); ++t) {
     const std::size_t m = mesh.material.empty() ? 0 : static_cast<std::size_t>(mesh.material[t]);
-    hyperelastic_body_load(elements[t], materials[m].density * acceleration,
-                           std::span(force).first(count == 4 ? 4 : 11));
+    fem::hyperelastic_body_load(elements[t], materials[m].density * acceleration,
+                                std::span(force).first(count == 4 ? 4 : 11));
     for (std::size_t a = 0; a < count; ++a)
       for (int axis = 0; axis < 3; ++axis)
-        load.axes[3 * std::size_t{solid_node(mesh, t, a)} + static_cast<std::size_t>(axis)] +=
+        load.axes[3 * std::size_t{fem::solid_node(mesh, t, a)} + static_cast<std::size_t>(axis)] +=
             force[a][axis];
     if (count == 10)
       load.bubbles[t] = force[10];
@@ -317,15 +320,16 @@ SolidVector hyperelastic_weight(const TetMesh& mesh, std::span<const SolidMateri
   return load;
 }
 
-double hyperelastic_energy(const TetMesh& mesh, std::span<const SolidElement> elements,
+double hyperelastic_energy(const tetrahedra::TetMesh& mesh,
+                           std::span<const fem::SolidElement> elements,
                            const SolidVector& displacement, const Context& context) {
   std::vector<double> energy(elements.size());
   parallel_blocks(context, elements.size(), grain, [&](std::size_t begin, std::size_t end) {
-    HyperelasticResponse response;
+    fem::HyperelasticResponse response;
     for (std::size_t t = begin; t < end; ++t) {
       const ElementDisplacement u = of_element(mesh, displacement, t);
-      hyperelastic_response(elements[t], std::span(u.nodes).first(solid_nodes(mesh)), u.bubble,
-                            HyperelasticPart::energy, response);
+      fem::hyperelastic_response(elements[t], std::span(u.nodes).first(fem::solid_nodes(mesh)),
+                                 u.bubble, fem::HyperelasticPart::energy, response);
       energy[t] = response.energy;
     }
   });
@@ -335,16 +339,17 @@ double hyperelastic_energy(const TetMesh& mesh, std::span<const SolidElement> el
   return sum;
 }
 
-SolidVector hyperelastic_forces(const TetMesh& mesh, std::span<const SolidElement> elements,
+SolidVector hyperelastic_forces(const tetrahedra::TetMesh& mesh,
+                                std::span<const fem::SolidElement> elements,
                                 const SolidVector& displacement, const Context& context) {
-  const std::size_t count = solid_nodes(mesh);
-  std::vector<std::array<Vec3, HyperelasticResponse::nodes>> forces(elements.size());
+  const std::size_t count = fem::solid_nodes(mesh);
+  std::vector<std::array<Vec3, fem::HyperelasticResponse::nodes>> forces(elements.size());
   parallel_blocks(context, elements.size(), grain, [&](std::size_t begin, std::size_t end) {
-    HyperelasticResponse response;
+    fem::HyperelasticResponse response;
     for (std::size_t t = begin; t < end; ++t) {
       const ElementDisplacement u = of_element(mesh, displacement, t);
-      hyperelastic_response(elements[t], std::span(u.nodes).first(count), u.bubble,
-                            HyperelasticPart::force, response);
+      fem::hyperelastic_response(elements[t], std::span(u.nodes).first(count), u.bubble,
+                                 fem::HyperelasticPart::force, response);
       forces[t] = response.force;
     }
   });
@@ -352,14 +357,15 @@ SolidVector hyperelastic_forces(const TetMesh& mesh, std::span<const SolidElemen
   for (std::size_t t = 0; t < elements.size(); ++t)
     for (std::size_t a = 0; a < count; ++a)
       for (int axis = 0; axis < 3; ++axis)
-        sum.axes[3 * std::size_t{solid_node(mesh, t, a)} + static_cast<std::size_t>(axis)] +=
+        sum.axes[3 * std::size_t{fem::solid_node(mesh, t, a)} + static_cast<std::size_t>(axis)] +=
             forces[t][a][axis];
   for (std::size_t t = 0; count == 10 && t < elements.size(); ++t)
     sum.bubbles.push_back(forces[t][10]);
   return sum;
 }
 
-HyperelasticState hyperelastic_statics(const TetMesh& mesh, std::span<const SolidElement> elements,
+HyperelasticState hyperelastic_statics(const tetrahedra::TetMesh& mesh,
+                                       std::span<const fem::SolidElement> elements,
                                        std::span<const std::uint8_t> fixed,
                                        std::span<const double> prescribed, const SolidVector& load,
                                        const HyperelasticOptions& options, const Context& context) {
@@ -412,7 +418,8 @@ HyperelasticState hyperelastic_statics(const TetMesh& mesh, std::span<const Soli
 }
 
 std::vector<std::vector<double>>
-hyperelastic_response_to(const TetMesh& mesh, std::span<const SolidElement> elements,
+hyperelastic_response_to(const tetrahedra::TetMesh& mesh,
+                         std::span<const fem::SolidElement> elements,
                          std::span<const std::uint8_t> fixed, const SolidVector& at,
                          std::span<const SolidVector> changes, const HyperelasticOptions& options,
                          const Context& context) {
@@ -423,4 +430,4 @@ hyperelastic_response_to(const TetMesh& mesh, std::span<const SolidElement> elem
   return moves;
 }
 
-} // namespace gewebe
+} // namespace gewebe::fit

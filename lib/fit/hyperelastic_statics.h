@@ -16,7 +16,7 @@
 #include <span>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::fit {
 
 /// On or of the nodes' 3 n axes, and the bubbles of quadratic elements (one per tetrahedron; empty
 /// counts as 0).
@@ -27,16 +27,20 @@ struct SolidVector {
 
 /// The forces of gravity under an acceleration in mm/s².
 /// \pre elements are those of the mesh and the materials
-SolidVector hyperelastic_weight(const TetMesh& mesh, std::span<const SolidMaterial> materials,
-                                std::span<const SolidElement> elements, const Vec3& acceleration);
+SolidVector hyperelastic_weight(const tetrahedra::TetMesh& mesh,
+                                std::span<const fem::SolidMaterial> materials,
+                                std::span<const fem::SolidElement> elements,
+                                const Vec3& acceleration);
 
 /// The energy under displacements, g mm²/s². The same bits on any number of threads.
-double hyperelastic_energy(const TetMesh& mesh, std::span<const SolidElement> elements,
+double hyperelastic_energy(const tetrahedra::TetMesh& mesh,
+                           std::span<const fem::SolidElement> elements,
                            const SolidVector& displacement, const Context& context = {});
 
 /// -dE/du, on fixed axes too. \pre as hyperelastic_response: a classical Neo-Hookean solid is
 /// nowhere inverted
-SolidVector hyperelastic_forces(const TetMesh& mesh, std::span<const SolidElement> elements,
+SolidVector hyperelastic_forces(const tetrahedra::TetMesh& mesh,
+                                std::span<const fem::SolidElement> elements,
                                 const SolidVector& displacement, const Context& context = {});
 
 struct HyperelasticOptions {
@@ -64,7 +68,8 @@ struct HyperelasticState {
 /// unless the state stands in one exactly, as a column does that is pushed along its axis.
 /// \pre load.axes.size() == fixed.size() == 3 n, as in solid_stiffness
 /// \throw Error if it doesn't get there in steps of least_step, or as solid_stiffness; Cancelled
-HyperelasticState hyperelastic_statics(const TetMesh& mesh, std::span<const SolidElement> elements,
+HyperelasticState hyperelastic_statics(const tetrahedra::TetMesh& mesh,
+                                       std::span<const fem::SolidElement> elements,
                                        std::span<const std::uint8_t> fixed,
                                        std::span<const double> prescribed, const SolidVector& load,
                                        const HyperelasticOptions& options = {},
@@ -74,9 +79,10 @@ HyperelasticState hyperelastic_statics(const TetMesh& mesh, std::span<const Soli
 /// the 3 n axes, 0 on fixed ones. \pre `at` is a balance of these elements
 /// \throw Error if the balance isn't stable; Cancelled
 std::vector<std::vector<double>>
-hyperelastic_response_to(const TetMesh& mesh, std::span<const SolidElement> elements,
+hyperelastic_response_to(const tetrahedra::TetMesh& mesh,
+                         std::span<const fem::SolidElement> elements,
                          std::span<const std::uint8_t> fixed, const SolidVector& at,
                          std::span<const SolidVector> changes,
                          const HyperelasticOptions& options = {}, const Context& context = {});
 
-} // namespace gewebe
+} // namespace gewebe::fit

@@ -13,7 +13,7 @@
 #include <numbers>
 #include <string>
 
-namespace gewebe {
+namespace gewebe::fit {
 
 namespace {
 
@@ -121,7 +121,7 @@ SwingFit fit_swing(std::span<const double> times, std::span<const double> values
   for (std::size_t k = 1; k < times.size(); ++k)
     if (!(times[k] > times[k - 1]))
       throw Error("sample " + std::to_string(k + 1) + " of the swing, at " +
-                  rounded_text(times[k]) +
+                  text::rounded_text(times[k]) +
                   " s, is not after the one before, expected ascending times");
   const auto count = static_cast<Eigen::Index>(times.size());
   Samples s;
@@ -139,13 +139,13 @@ SwingFit fit_swing(std::span<const double> times, std::span<const double> values
   fit.frequency = std::abs(p[4]) / two_pi;
   if (!(fit.explained >= least_explained))
     throw Error("no swing that dies away is in the samples: the best one, of " +
-                rounded_text(fit.frequency) + " Hz, explains " + rounded_text(100 * fit.explained) +
-                " % of their variance, expected " + rounded_text(100 * least_explained) +
-                " at least");
+                text::rounded_text(fit.frequency) + " Hz, explains " +
+                text::rounded_text(100 * fit.explained) + " % of their variance, expected " +
+                text::rounded_text(100 * least_explained) + " at least");
   const double swings = fit.frequency * s.t[count - 1];
   if (!(swings >= fewest_swings))
-    throw Error("the samples hold " + rounded_text(swings) + " swings, expected " +
-                rounded_text(fewest_swings) + " at least");
+    throw Error("the samples hold " + text::rounded_text(swings) + " swings, expected " +
+                text::rounded_text(fewest_swings) + " at least");
   if (!(p[3] > 0))
     throw Error("the swing does not die away, expected one that does");
   const double w = std::hypot(p[3], p[4]);
@@ -155,7 +155,7 @@ SwingFit fit_swing(std::span<const double> times, std::span<const double> values
   const double freedom = static_cast<double>(count - 5);
   const Eigen::Matrix<double, 5, 5> covariance =
       sum / freedom * normal.ldlt().solve(Eigen::Matrix<double, 5, 5>::Identity());
-  const double t = student_t_quantile(0.025, static_cast<std::uint64_t>(count - 5));
+  const double t = numeric::student_t_quantile(0.025, static_cast<std::uint64_t>(count - 5));
   const double wide = t * std::sqrt(covariance(4, 4)) / two_pi;
   fit.frequency_interval = {fit.frequency - wide, fit.frequency + wide};
   // of Z by decay rate and frequency
@@ -167,4 +167,4 @@ SwingFit fit_swing(std::span<const double> times, std::span<const double> values
   return fit;
 }
 
-} // namespace gewebe
+} // namespace gewebe::fit

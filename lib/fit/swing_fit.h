@@ -9,7 +9,7 @@
 #include <array>
 #include <span>
 
-namespace gewebe {
+namespace gewebe::fit {
 
 struct SwingFit {
   double frequency = 0; ///< of the damped swing, w'/2π, Hz
@@ -26,4 +26,4 @@ struct SwingFit {
 /// half of the variance stays unexplained, or the swing doesn't die away
 SwingFit fit_swing(std::span<const double> times, std::span<const double> values);
 
-} // namespace gewebe
+} // namespace gewebe::fit

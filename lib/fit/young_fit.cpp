@@ -14,7 +14,7 @@
 #include <cmath>
 #include <utility>
 
-namespace gewebe {
+namespace gewebe::fit {
 
 namespace {
 
@@ -27,27 +27,27 @@ constexpr double widest = 4;    // factor of a modulus in a round
 /// One measured axis of one place.
 struct Datum {
   std::size_t of_case = 0;
-  SolidPlace place;
+  embedding::SolidPlace place;
   int axis = 0;
   double value = 0;
   const std::string* name = nullptr;
 };
 
 double predicted(const Datum& d, std::span<const double> u) {
-  return displacement_at(d.place, u)[d.axis];
+  return embedding::displacement_at(d.place, u)[d.axis];
 }
 
-std::vector<Datum> data_of(const TetMesh& mesh, std::span<const std::uint8_t> fixed,
+std::vector<Datum> data_of(const tetrahedra::TetMesh& mesh, std::span<const std::uint8_t> fixed,
                            std::span<const MeasuredCase> cases) {
-  const Box3 box = bounding_box(mesh);
+  const Box3 box = tetrahedra::bounding_box(mesh);
   const double limit = furthest * norm(box.max - box.min);
   std::vector<Datum> data;
   for (std::size_t c = 0; c < cases.size(); ++c)
     for (const Measurement& m : cases[c].measurements) {
-      const SolidPlace place = find_place(mesh, m.place);
+      const embedding::SolidPlace place = embedding::find_place(mesh, m.place);
       if (!(place.outside <= limit))
-        throw Error(m.name, "the place is " + rounded_text(place.outside) +
-                                " mm off the body, expected at most " + rounded_text(limit));
+        throw Error(m.name, "the place is " + text::rounded_text(place.outside) +
+                                " mm off the body, expected at most " + text::rounded_text(limit));
       for (int axis = 0; axis < 3; ++axis) {
         const std::optional<double>& value = m.displacement[static_cast<std::size_t>(axis)];
         if (!value)
@@ -72,10 +72,10 @@ double mean_square(std::span<const double> values) {
 }
 
 /// A common factor of all moduli with which small strains fit the measurements.
-double start_factor(const TetMesh& mesh, std::span<const SolidMaterial> materials,
+double start_factor(const tetrahedra::TetMesh& mesh, std::span<const fem::SolidMaterial> materials,
                     std::span<const std::uint8_t> fixed, std::span<const MeasuredCase> cases,
                     std::span<const Datum> data, const Context& context) {
-  const std::vector<SolidElement> elements = solid_elements(mesh, materials, context);
+  const std::vector<fem::SolidElement> elements = fem::solid_elements(mesh, materials, context);
   SolidVector rest{std::vector<double>(fixed.size()), {}};
   rest.bubbles.resize(mesh.middles.empty() ? 0 : elements.size());
   std::vector<SolidVector> loads;
@@ -114,7 +114,7 @@ double start_factor(const TetMesh& mesh, std::span<const SolidMaterial> material
 
 class Fit {
 public:
-  Fit(const TetMesh& mesh, std::span<const SolidMaterial> materials,
+  Fit(const tetrahedra::TetMesh& mesh, std::span<const fem::SolidMaterial> materials,
       std::span<const std::string> names, std::span<const std::size_t> sought,
       std::span<const std::uint8_t> fixed, std::span<const MeasuredCase> cases,
       const std::vector<Datum>& data, const Context& context)
@@ -133,7 +133,8 @@ public:
 
   /// Balances and derivatives at the moduli as they are.
   void solve() {
-    const std::vector<SolidElement> elements = solid_elements(mesh_, materials_, context_);
+    const std::vector<fem::SolidElement> elements =
+        fem::solid_elements(mesh_, materials_, context_);
     for (std::size_t c = 0; c < cases_.size(); ++c) {
       HyperelasticOptions options = options_;
       options.start = fit_.displacement[c];
@@ -195,7 +196,7 @@ public:
       if (freedom > 0) {
         const auto i = static_cast<Eigen::Index>(p);
         const double width =
-            student_t_quantile((1 - confidence) / 2, data_.size() - sought_.size()) *
+            numeric::student_t_quantile((1 - confidence) / 2, data_.size() - sought_.size()) *
             std::sqrt(variance * inverse(i, i));
         young.interval = {young.young * std::exp(-width), young.young * std::exp(width)};
       }
@@ -214,12 +215,14 @@ public:
     if (!(residual_.cwiseAbs().maxCoeff(&row) > 0))
       return "";
     const Datum& d = data_[static_cast<std::size_t>(row)];
-    return *d.name + " is farthest from the others: " + rounded_text(d.value) +
-           " mm measured where " + rounded_text(d.value + residual_[row]) + " mm are computed";
+    return *d.name + " is farthest from the others: " + text::rounded_text(d.value) +
+           " mm measured where " + text::rounded_text(d.value + residual_[row]) +
+           " mm are computed";
   }
 
 private:
-  std::vector<SolidElement> only(std::vector<SolidElement> elements, std::size_t material) const {
+  std::vector<fem::SolidElement> only(std::vector<fem::SolidElement> elements,
+                                      std::size_t material) const {
     for (std::size_t t = 0; t < elements.size(); ++t) {
       const std::size_t m =
           mesh_.material.empty() ? 0 : static_cast<std::size_t>(mesh_.material[t]);
@@ -260,8 +263,8 @@ private:
   void find_outliers(const Eigen::MatrixXd& inverse, double freedom) {
     const double square = residual_.squaredNorm();
     const double limit =
-        student_t_quantile((1 - confidence) / 2 / static_cast<double>(data_.size()),
-                           data_.size() - sought_.size() - 1);
+        numeric::student_t_quantile((1 - confidence) / 2 / static_cast<double>(data_.size()),
+                                    data_.size() - sought_.size() - 1);
     double size = 0;
     for (const Datum& d : data_)
       size = std::max(size, std::abs(d.value));
@@ -280,8 +283,8 @@ private:
 
   std::string name(Eigen::Index p) const { return names_[sought_[static_cast<std::size_t>(p)]]; }
 
-  const TetMesh& mesh_;
-  std::vector<SolidMaterial> materials_;
+  const tetrahedra::TetMesh& mesh_;
+  std::vector<fem::SolidMaterial> materials_;
   std::span<const std::string> names_;
   std::span<const std::size_t> sought_;
   std::span<const std::uint8_t> fixed_;
@@ -296,7 +299,7 @@ private:
 
 } // namespace
 
-YoungFit fit_young(const TetMesh& mesh, std::span<const SolidMaterial> materials,
+YoungFit fit_young(const tetrahedra::TetMesh& mesh, std::span<const fem::SolidMaterial> materials,
                    std::span<const std::string> names, std::span<const std::size_t> sought,
                    std::span<const std::uint8_t> fixed, std::span<const MeasuredCase> cases,
                    const YoungFitOptions& options, const Context& context) {
@@ -312,13 +315,13 @@ YoungFit fit_young(const TetMesh& mesh, std::span<const SolidMaterial> materials
   const auto naming_worst = [&](auto&& work) {
     try {
       return work();
-    } catch (const Cancelled&) {
+    } catch (const gewebe::Cancelled&) {
       throw;
-    } catch (const Error& error) {
+    } catch (const gewebe::Error& error) {
       const std::string worst = data.size() > 1 ? fit.worst_measurement() : "";
       if (worst.empty() || !error.place().empty())
         throw;
-      throw Error(error.what() + ("; " + worst));
+      throw gewebe::Error(error.what() + ("; " + worst));
     }
   };
   fit.solve();
@@ -329,11 +332,11 @@ YoungFit fit_young(const TetMesh& mesh, std::span<const SolidMaterial> materials
         return fit.result();
       if (fit.solves() + static_cast<int>(cases.size()) > options.max_solves)
         throw Error("the fit did not end in " + std::to_string(fit.solves()) +
-                    " solves: moduli still change by " + rounded_text(100 * change) +
+                    " solves: moduli still change by " + text::rounded_text(100 * change) +
                     " %, expected measurements of this body under these loads");
       fit.solve();
     }
   });
 }
 
-} // namespace gewebe
+} // namespace gewebe::fit

@@ -29,7 +29,7 @@
 #include <string>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::fit {
 
 /// A displacement of one place.
 struct Measurement {
@@ -73,9 +73,9 @@ struct YoungFitOptions {
 /// materials; a measurement off the body by over a tenth of its size, of what is held, or all
 /// against the load; materials on which no measurement depends, or that cannot be distinguished;
 /// rounds that don't end; as hyperelastic_statics; Cancelled
-YoungFit fit_young(const TetMesh& mesh, std::span<const SolidMaterial> materials,
+YoungFit fit_young(const tetrahedra::TetMesh& mesh, std::span<const fem::SolidMaterial> materials,
                    std::span<const std::string> names, std::span<const std::size_t> sought,
                    std::span<const std::uint8_t> fixed, std::span<const MeasuredCase> cases,
                    const YoungFitOptions& options = {}, const Context& context = {});
 
-} // namespace gewebe
+} // namespace gewebe::fit

@@ -11,7 +11,7 @@
 #include <string_view>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::gl {
 namespace {
 
 /// libepoxy ends the process where these are missing, so look first. They stay loaded.
@@ -194,4 +194,4 @@ int GlContext::max_side() const {
   return state_->max_side;
 }
 
-} // namespace gewebe
+} // namespace gewebe::gl

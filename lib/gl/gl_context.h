@@ -4,7 +4,7 @@
 #include <memory>
 #include <string>
 
-namespace gewebe {
+namespace gewebe::gl {
 
 /// An OpenGL context, current on the thread that made it until it is destroyed there.
 class GlContext {
@@ -29,4 +29,4 @@ private:
   std::unique_ptr<State> state_;
 };
 
-} // namespace gewebe
+} // namespace gewebe::gl

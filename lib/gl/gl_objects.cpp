@@ -8,7 +8,7 @@
 #include <cstddef>
 #include <utility>
 
-namespace gewebe {
+namespace gewebe::gl {
 namespace {
 
 // epoxy's names are pointers that change at the first call, so functions of our own stand for them.
@@ -25,19 +25,20 @@ void delete_framebuffers(GLsizei n, const GLuint* names) {
   glDeleteFramebuffers(n, names);
 }
 
-GLint wrap_of(TextureWrap wrap) {
-  return wrap == TextureWrap::repeat  ? GL_REPEAT
-         : wrap == TextureWrap::clamp ? GL_CLAMP_TO_EDGE
-                                      : GL_MIRRORED_REPEAT;
+GLint wrap_of(texture::TextureWrap wrap) {
+  return wrap == texture::TextureWrap::repeat  ? GL_REPEAT
+         : wrap == texture::TextureWrap::clamp ? GL_CLAMP_TO_EDGE
+                                               : GL_MIRRORED_REPEAT;
 }
 
-GLuint new_texture(GlNames& names, const TextureOptions& options, std::size_t levels) {
+GLuint new_texture(GlNames& names, const texture::TextureOptions& options, std::size_t levels) {
   GLuint name = 0;
   glGenTextures(1, &name);
   names.keep(name);
   glBindTexture(GL_TEXTURE_2D, name);
-  const GLint near = options.filter == TextureFilter::nearest ? GL_NEAREST : GL_LINEAR;
-  const GLint far = options.filter == TextureFilter::mipmap ? GL_LINEAR_MIPMAP_LINEAR : near;
+  const GLint near = options.filter == texture::TextureFilter::nearest ? GL_NEAREST : GL_LINEAR;
+  const GLint far =
+      options.filter == texture::TextureFilter::mipmap ? GL_LINEAR_MIPMAP_LINEAR : near;
   for (const auto& [parameter, value] : {std::pair<GLenum, GLint>{GL_TEXTURE_MIN_FILTER, far},
                                          {GL_TEXTURE_MAG_FILTER, near},
                                          {GL_TEXTURE_WRAP_S, wrap_of(options.wrap)},
@@ -66,10 +67,10 @@ const void* at(std::size_t offset) {
 
 GlTextures::GlTextures() : names_(delete_textures) {}
 
-GLuint GlTextures::load(const Texture& texture, bool structure) {
+GLuint GlTextures::load(const texture::Texture& texture, bool structure) {
   const GLuint name = new_texture(names_, texture.options, texture.levels.size());
   for (std::size_t n = 0; n < texture.levels.size(); ++n) {
-    const TextureLevel& level = texture.levels[n];
+    const texture::TextureLevel& level = texture.levels[n];
     const auto w = static_cast<GLsizei>(level.width), h = static_cast<GLsizei>(level.height);
     const std::uint32_t* const texels = texture.texels->data() + level.first;
     if (texture.channels == 1) {
@@ -87,8 +88,9 @@ GLuint GlTextures::load(const Texture& texture, bool structure) {
   return name;
 }
 
-GLuint GlTextures::load_joined(const std::optional<Texture>& base, const Texture& structure) {
-  const Texture& lead = base ? *base : structure;
+GLuint GlTextures::load_joined(const std::optional<texture::Texture>& base,
+                               const texture::Texture& structure) {
+  const texture::Texture& lead = base ? *base : structure;
   const bool same =
       !base || (base->width() == structure.width() && base->height() == structure.height());
   const GLuint name = new_texture(names_, lead.options, lead.levels.size());
@@ -101,8 +103,9 @@ GLuint GlTextures::load_joined(const std::optional<Texture>& base, const Texture
     const std::uint32_t w = std::max(1U, width >> n), h = std::max(1U, height >> n);
     std::vector<std::uint16_t> texels;
     texels.reserve(std::size_t{4} * w * h);
-    const auto value = [&](const Texture& texture, std::uint32_t x, std::uint32_t y) {
-      return same ? texel(texture, n, x, y) : sample(texture, (x + 0.5) / w, (y + 0.5) / h);
+    const auto value = [&](const texture::Texture& texture, std::uint32_t x, std::uint32_t y) {
+      return same ? texture::texel(texture, n, x, y)
+                  : texture::sample(texture, (x + 0.5) / w, (y + 0.5) / h);
     };
     for (std::uint32_t y = 0; y < h; ++y)
       for (std::uint32_t x = 0; x < w; ++x) {
@@ -175,27 +178,28 @@ void GlTarget::resolve() const {
   glBindFramebuffer(GL_FRAMEBUFFER, read_);
 }
 
-GlGeometry::GlGeometry(const Drawing& drawing, const SurfaceMaterial& material)
+GlGeometry::GlGeometry(const shading::Drawing& drawing, const texture::SurfaceMaterial& material)
     : buffers_(delete_buffers) {
   vertices_ = new_buffer(buffers_, GL_ARRAY_BUFFER, drawing.vertices.data(),
-                         drawing.vertices.size() * sizeof(DrawVertex));
+                         drawing.vertices.size() * sizeof(shading::DrawVertex));
   if (!drawing.frames.empty())
     frames_ = new_buffer(buffers_, GL_ARRAY_BUFFER, drawing.frames.data(),
-                         drawing.frames.size() * sizeof(DrawFrame));
+                         drawing.frames.size() * sizeof(shading::DrawFrame));
   if (!drawing.rests.empty())
     rests_ = new_buffer(buffers_, GL_ARRAY_BUFFER, drawing.rests.data(),
-                        drawing.rests.size() * sizeof(DrawRest));
+                        drawing.rests.size() * sizeof(texture::DrawRest));
   if (!drawing.turns.empty())
     turns_ = new_buffer(buffers_, GL_ARRAY_BUFFER, drawing.turns.data(),
-                        drawing.turns.size() * sizeof(DrawTurn));
-  if (std::ranges::any_of(drawing.vertices, [](const DrawVertex& v) { return v.shade != 1.0F; }))
-    for (std::size_t g = 0; g < group_count(drawing); ++g) {
-      const Vec3& color = material_of_group(material, g).color;
+                        drawing.turns.size() * sizeof(texture::DrawTurn));
+  if (std::ranges::any_of(drawing.vertices,
+                          [](const shading::DrawVertex& v) { return v.shade != 1.0F; }))
+    for (std::size_t g = 0; g < shading::group_count(drawing); ++g) {
+      const Vec3& color = texture::material_of_group(material, g).color;
       if (std::ranges::any_of(colors_, [&](const auto& c) { return c.first == color; }))
         continue;
       std::vector<std::array<float, 4>> colors;
       colors.reserve(drawing.vertices.size());
-      for (const DrawVertex& v : drawing.vertices)
+      for (const shading::DrawVertex& v : drawing.vertices)
         colors.push_back({static_cast<float>(color.x * double{v.shade}),
                           static_cast<float>(color.y * double{v.shade}),
                           static_cast<float>(color.z * double{v.shade}), 1.0F});
@@ -206,23 +210,25 @@ GlGeometry::GlGeometry(const Drawing& drawing, const SurfaceMaterial& material)
                         drawing.triangles.size() * sizeof(Triangle));
   glBindBuffer(GL_ARRAY_BUFFER, vertices_); // what pointers count from
   glEnableClientState(GL_VERTEX_ARRAY);
-  glVertexPointer(3, GL_FLOAT, sizeof(DrawVertex), at(offsetof(DrawVertex, position)));
+  glVertexPointer(3, GL_FLOAT, sizeof(shading::DrawVertex),
+                  at(offsetof(shading::DrawVertex, position)));
 }
 
 void GlGeometry::use_texcoords(int unit, std::size_t offset, int count) const {
   glBindBuffer(GL_ARRAY_BUFFER, vertices_);
   glClientActiveTexture(GL_TEXTURE0 + static_cast<GLenum>(unit));
   glEnableClientState(GL_TEXTURE_COORD_ARRAY);
-  glTexCoordPointer(count, GL_FLOAT, sizeof(DrawVertex), at(offset));
+  glTexCoordPointer(count, GL_FLOAT, sizeof(shading::DrawVertex), at(offset));
 }
 
 void GlGeometry::use_frames() const {
   glBindBuffer(GL_ARRAY_BUFFER, frames_);
   glEnableClientState(GL_NORMAL_ARRAY);
-  glNormalPointer(GL_FLOAT, sizeof(DrawFrame), at(offsetof(DrawFrame, normal)));
+  glNormalPointer(GL_FLOAT, sizeof(shading::DrawFrame), at(offsetof(shading::DrawFrame, normal)));
   glClientActiveTexture(GL_TEXTURE1);
   glEnableClientState(GL_TEXTURE_COORD_ARRAY);
-  glTexCoordPointer(4, GL_FLOAT, sizeof(DrawFrame), at(offsetof(DrawFrame, tangent)));
+  glTexCoordPointer(4, GL_FLOAT, sizeof(shading::DrawFrame),
+                    at(offsetof(shading::DrawFrame, tangent)));
 }
 
 void GlGeometry::use_rests() const {
@@ -232,16 +238,16 @@ void GlGeometry::use_rests() const {
     glTexCoordPointer(3, GL_FLOAT, stride, at(offset));
   };
   glBindBuffer(GL_ARRAY_BUFFER, rests_);
-  use(3, sizeof(DrawRest), offsetof(DrawRest, place));
-  use(4, sizeof(DrawRest), offsetof(DrawRest, normal));
+  use(3, sizeof(texture::DrawRest), offsetof(texture::DrawRest, place));
+  use(4, sizeof(texture::DrawRest), offsetof(texture::DrawRest, normal));
   if (turns_ == 0)
     return;
   glBindBuffer(GL_ARRAY_BUFFER, turns_);
-  use(5, sizeof(DrawTurn), offsetof(DrawTurn, x));
-  use(6, sizeof(DrawTurn), offsetof(DrawTurn, y));
+  use(5, sizeof(texture::DrawTurn), offsetof(texture::DrawTurn, x));
+  use(6, sizeof(texture::DrawTurn), offsetof(texture::DrawTurn, y));
 }
 
-void GlGeometry::use_colors(const SurfaceMaterial& material) const {
+void GlGeometry::use_colors(const texture::SurfaceMaterial& material) const {
   glColor4d(material.color.x, material.color.y, material.color.z, 1);
   for (const auto& [color, buffer] : colors_)
     if (color == material.color) {
@@ -278,4 +284,4 @@ void stop_if_cancelled(const Context& context) {
     throw Cancelled();
 }
 
-} // namespace gewebe
+} // namespace gewebe::gl

@@ -13,7 +13,7 @@
 #include <utility>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::gl {
 
 /// Objects of one kind.
 class GlNames {
@@ -40,10 +40,11 @@ private:
 class GlTextures {
 public:
   GlTextures();
-  GLuint load(const Texture& texture, bool structure);
+  GLuint load(const texture::Texture& texture, bool structure);
   /// Red, green, blue of the base, and half the structure as alpha, so that the sum of two stays
   /// below 1.
-  GLuint load_joined(const std::optional<Texture>& base, const Texture& structure);
+  GLuint load_joined(const std::optional<texture::Texture>& base,
+                     const texture::Texture& structure);
 
 private:
   GlNames names_;
@@ -68,15 +69,15 @@ private:
 /// A drawing in buffers.
 class GlGeometry {
 public:
-  GlGeometry(const Drawing& drawing, const SurfaceMaterial& material);
+  GlGeometry(const shading::Drawing& drawing, const texture::SurfaceMaterial& material);
   /// Of one unit.
   void use_texcoords(int unit, std::size_t offset, int count) const;
   void use_frames() const; ///< normals; tangent and side as coordinates of unit 1
   /// Places and normals at rest as coordinates of units 3 and 4, turns of 5 and 6 where there are
   /// any.
   void use_rests() const;
-  void use_colors(
-      const SurfaceMaterial& material) const; ///< those of the vertices, times the material's
+  void use_colors(const texture::SurfaceMaterial& material)
+      const; ///< those of the vertices, times the material's
   void no_colors() const;
   void draw(std::size_t first, std::size_t count, const Context& context) const; ///< triangles
 
@@ -90,4 +91,4 @@ private:
 void check_gl();
 void stop_if_cancelled(const Context& context);
 
-} // namespace gewebe
+} // namespace gewebe::gl

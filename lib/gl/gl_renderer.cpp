@@ -15,14 +15,14 @@
 
 // Based on: report FZKA 7190, 2006, section 3.2.4, render-pass-3, -2 and -1.
 
-namespace gewebe {
+namespace gewebe::gl {
 namespace {
 
 void set_env(GLenum name, GLenum value) {
   glTexEnvi(GL_TEXTURE_ENV, name, static_cast<GLint>(value));
 }
 
-void set_matrices(const Projection& projection) {
+void set_matrices(const shading::Projection& projection) {
   std::array<double, 16> columns{};
   for (std::size_t row = 0; row < 4; ++row)
     for (std::size_t column = 0; column < 4; ++column)
@@ -50,13 +50,13 @@ void combine(GLenum target, GLenum function, std::initializer_list<Source> sourc
 }
 
 /// What the program of a GlShader depends on, besides the drawing.
-std::string shader_kind(const SurfaceMaterial& material) {
+std::string shader_kind(const texture::SurfaceMaterial& material) {
   unsigned kind = 0;
   for (const auto* texture :
        {&material.base, &material.detail, &material.reflection, &material.structure})
     kind = 4 * kind + (*texture ? ((*texture)->options.sphere ? 3U : 1U) : 0U);
   return std::to_string(kind) + (material.film.amount > 0 ? "wet" : "") +
-         (is_at_rest(material) ? rest_definitions(material) : "");
+         (texture::is_at_rest(material) ? rest_definitions(material) : "");
 }
 
 // At most so many passes blend into one group.
@@ -77,7 +77,7 @@ GlMode gl_mode_from_name(std::string_view name) {
 }
 
 struct GlRenderer::State {
-  State(GlContext& gl, const SurfaceMaterial& l, std::uint32_t w, std::uint32_t h,
+  State(GlContext& gl, const texture::SurfaceMaterial& l, std::uint32_t w, std::uint32_t h,
         const GlOptions& o)
       : material(l), options(o), width(w), height(h), target(check(gl), h, o.wide, o.samples) {}
 
@@ -90,7 +90,7 @@ struct GlRenderer::State {
     };
     at_most("a picture", width, height);
     for (std::size_t g = 0; g <= material.others.size(); ++g) {
-      const SurfaceMaterial& own = material_of_group(material, g);
+      const texture::SurfaceMaterial& own = texture::material_of_group(material, g);
       for (const auto* texture : {&own.base, &own.detail, &own.reflection, &own.structure})
         if (*texture)
           at_most("a texture", (*texture)->width(), (*texture)->height());
@@ -100,15 +100,16 @@ struct GlRenderer::State {
 
   /// Triangles with their material and its textures.
   struct Group {
-    const SurfaceMaterial* material = nullptr;
+    const texture::SurfaceMaterial* material = nullptr;
     GLuint base = 0, detail = 0, reflection = 0, structure = 0, joined = 0;
     std::size_t first = 0, count = 0; ///< triangles
   };
 
-  GLuint load(const std::optional<Texture>& texture, bool is_structure);
+  GLuint load(const std::optional<texture::Texture>& texture, bool is_structure);
   void load_textures();
   void draw_group(const Context& context);
-  void use(int unit, GLuint texture, const std::optional<Texture>& layer, bool shifted = false);
+  void use(int unit, GLuint texture, const std::optional<texture::Texture>& layer,
+           bool shifted = false);
   void drop_units();
   int use_colors(int unit);
   void next_pass(GLenum source, GLenum destination);
@@ -120,7 +121,7 @@ struct GlRenderer::State {
   void draw_one(const Context& context);
   void draw_shader(const Context& context);
 
-  SurfaceMaterial material;
+  texture::SurfaceMaterial material;
   GlOptions options;
   std::uint32_t width, height;
   GlTarget target;
@@ -131,14 +132,14 @@ struct GlRenderer::State {
   const Group* now = nullptr; ///< the group that is drawn
   std::optional<GlGeometry> geometry;
   std::map<std::string, GlShader> shaders; ///< by shader_kind
-  Drawing light;                           ///< without its vertices
+  shading::Drawing light;                  ///< without its vertices
   int units = 0;                           ///< in use
   int blended = 0;                         ///< what the stencil holds where the next pass may blend
   int passes = 0;
 };
 
 /// A texture that several groups share is loaded once.
-GLuint GlRenderer::State::load(const std::optional<Texture>& texture, bool is_structure) {
+GLuint GlRenderer::State::load(const std::optional<texture::Texture>& texture, bool is_structure) {
   if (!texture)
     return 0;
   GLuint& name = loaded[{texture->texels.get(), is_structure ? texture->texels.get() : nullptr}];
@@ -149,7 +150,7 @@ GLuint GlRenderer::State::load(const std::optional<Texture>& texture, bool is_st
 
 void GlRenderer::State::load_textures() {
   for (std::size_t g = 0; g <= material.others.size(); ++g) {
-    const SurfaceMaterial& own = material_of_group(material, g);
+    const texture::SurfaceMaterial& own = texture::material_of_group(material, g);
     Group& group = groups.emplace_back();
     group.material = &own;
     const bool join = options.mode == GlMode::passes1 && own.structure;
@@ -172,16 +173,16 @@ void GlRenderer::State::load_textures() {
   }
 }
 
-void GlRenderer::State::use(int unit, GLuint texture, const std::optional<Texture>& layer,
+void GlRenderer::State::use(int unit, GLuint texture, const std::optional<texture::Texture>& layer,
                             bool shifted) {
   glActiveTexture(GL_TEXTURE0 + static_cast<GLenum>(unit));
   glEnable(GL_TEXTURE_2D);
   glBindTexture(GL_TEXTURE_2D, texture);
   set_env(GL_RGB_SCALE, 1);
   geometry->use_texcoords(unit,
-                          shifted                          ? offsetof(DrawVertex, shifted)
-                          : layer && layer->options.sphere ? offsetof(DrawVertex, sphere)
-                                                           : offsetof(DrawVertex, st),
+                          shifted                          ? offsetof(shading::DrawVertex, shifted)
+                          : layer && layer->options.sphere ? offsetof(shading::DrawVertex, sphere)
+                                                           : offsetof(shading::DrawVertex, st),
                           2);
   units = std::max(units, unit + 1);
 }
@@ -349,16 +350,16 @@ void GlRenderer::State::draw_shader(const Context& context) {
   bind(detail_unit, now->detail);
   bind(reflection_unit, now->reflection);
   bind(structure_unit, now->structure);
-  geometry->use_texcoords(0, offsetof(DrawVertex, st), 2);
+  geometry->use_texcoords(0, offsetof(shading::DrawVertex, st), 2);
   if (light.frames.empty()) {
-    geometry->use_texcoords(1, offsetof(DrawVertex, shifted), 2);
-    geometry->use_texcoords(2, offsetof(DrawVertex, sphere), 2);
+    geometry->use_texcoords(1, offsetof(shading::DrawVertex, shifted), 2);
+    geometry->use_texcoords(2, offsetof(shading::DrawVertex, sphere), 2);
   } else {
     geometry->use_frames();
   }
   units = 3;
   units = 3;
-  if (is_at_rest(*now->material)) {
+  if (texture::is_at_rest(*now->material)) {
     geometry->use_rests();
     units = light.turns.empty() ? 5 : 7;
   }
@@ -406,22 +407,23 @@ void GlRenderer::State::draw_group(const Context& context) {
   }
 }
 
-GlRenderer::GlRenderer(GlContext& gl, const SurfaceMaterial& material, std::uint32_t width,
+GlRenderer::GlRenderer(GlContext& gl, const texture::SurfaceMaterial& material, std::uint32_t width,
                        std::uint32_t height, const GlOptions& options)
     : state_(std::make_unique<State>(gl, material, width, height, options)) {
   for (std::size_t g = 0; g <= material.others.size(); ++g)
-    if (is_at_rest(material_of_group(material, g)) && options.mode != GlMode::shader)
+    if (texture::is_at_rest(texture::material_of_group(material, g)) &&
+        options.mode != GlMode::shader)
       throw Error("the fixed functions know neither three projections nor solid textures, expected "
                   "the shader");
   for (std::size_t g = 0; g <= material.others.size(); ++g)
-    if (material_of_group(material, g).film.amount > 0 && options.mode != GlMode::shader)
+    if (texture::material_of_group(material, g).film.amount > 0 && options.mode != GlMode::shader)
       throw Error("the fixed functions know no wet film, expected the shader");
   state_->load_textures();
   GLint max = 0;
   glGetIntegerv(GL_MAX_TEXTURE_UNITS, &max);
   int wanted = 2;
   for (std::size_t g = 0; g <= material.others.size(); ++g) {
-    const SurfaceMaterial& own = material_of_group(material, g);
+    const texture::SurfaceMaterial& own = texture::material_of_group(material, g);
     if (options.mode == GlMode::passes1 && own.structure)
       wanted = std::max(wanted, 3 + (own.detail ? 1 : 0) + (own.reflection ? 1 : 0));
   }
@@ -432,7 +434,7 @@ GlRenderer::GlRenderer(GlContext& gl, const SurfaceMaterial& material, std::uint
 }
 GlRenderer::~GlRenderer() = default;
 
-void GlRenderer::set_drawing(const Drawing& drawing) {
+void GlRenderer::set_drawing(const shading::Drawing& drawing) {
   State& s = *state_;
   if (!drawing.frames.empty() && s.options.mode != GlMode::shader)
     throw Error("the fixed functions have no use for frames, expected offsets at the vertices");
@@ -446,15 +448,16 @@ void GlRenderer::set_drawing(const Drawing& drawing) {
     s.shaders.clear();
   for (std::size_t g = 0; g < s.groups.size(); ++g) {
     State::Group& group = s.groups[g];
-    const bool there = g < group_count(drawing);
-    const auto triangles = there ? triangles_of_group(drawing, g) : std::span<const Triangle>{};
+    const bool there = g < shading::group_count(drawing);
+    const auto triangles =
+        there ? shading::triangles_of_group(drawing, g) : std::span<const Triangle>{};
     group.first = there ? static_cast<std::size_t>(triangles.data() - drawing.triangles.data()) : 0;
     group.count = triangles.size();
     if (group.count == 0)
       continue;
     if (group.material->film.amount > 0 && !frames)
       throw Error("a wet film on a drawing without frames, expected them at each vertex");
-    if (is_at_rest(*group.material) && drawing.rests.empty())
+    if (texture::is_at_rest(*group.material) && drawing.rests.empty())
       throw Error("textures on the shape at rest for a drawing without it, expected its places");
     if (s.options.mode == GlMode::shader)
       s.shaders.try_emplace(shader_kind(*group.material), *group.material, frames, rotated);
@@ -467,8 +470,8 @@ void GlRenderer::set_drawing(const Drawing& drawing) {
   check_gl();
 }
 
-void GlRenderer::set_light(const Drawing& drawing) {
-  Drawing& light = state_->light;
+void GlRenderer::set_light(const shading::Drawing& drawing) {
+  shading::Drawing& light = state_->light;
   light.light = drawing.light;
   light.directional = drawing.directional;
   light.full_distance = drawing.full_distance;
@@ -476,7 +479,7 @@ void GlRenderer::set_light(const Drawing& drawing) {
   light.camera = drawing.camera;
 }
 
-void GlRenderer::draw(const Projection& projection, const Context& context) {
+void GlRenderer::draw(const shading::Projection& projection, const Context& context) {
   State& s = *state_;
   s.target.bind();
   glViewport(0, 0, static_cast<GLsizei>(s.width), static_cast<GLsizei>(s.height));
@@ -484,7 +487,7 @@ void GlRenderer::draw(const Projection& projection, const Context& context) {
   glClampColor(GL_CLAMP_READ_COLOR, GL_FALSE);
   glClampColor(GL_CLAMP_FRAGMENT_COLOR, GL_TRUE);
   glClampColor(GL_CLAMP_VERTEX_COLOR, GL_FALSE);
-  const std::array<std::uint8_t, 3> background = stored(s.material.background);
+  const std::array<std::uint8_t, 3> background = texture::stored(s.material.background);
   glClearColor(background[0] / 255.0F, background[1] / 255.0F, background[2] / 255.0F, 1);
   glColorMask(GL_TRUE, GL_TRUE, GL_TRUE, GL_TRUE);
   glDepthMask(GL_TRUE);
@@ -508,10 +511,10 @@ void GlRenderer::finish() {
   glFinish();
 }
 
-Image GlRenderer::read(const Context& context) {
+texture::Image GlRenderer::read(const Context& context) {
   const State& s = *state_;
   s.target.resolve();
-  Image image{s.width, s.height, 3, {}};
+  texture::Image image{s.width, s.height, 3, {}};
   image.values.resize(std::size_t{3} * s.width * s.height);
   constexpr std::uint32_t rows_at_once = 16;
   std::vector<std::array<float, 4>> rows(std::size_t{rows_at_once} * s.width);
@@ -524,7 +527,7 @@ Image GlRenderer::read(const Context& context) {
       std::uint8_t* out = &image.values[std::size_t{3} * s.width * (s.height - 1 - from - row)];
       for (std::size_t x = 0; x < s.width; ++x)
         for (std::size_t c = 0; c < 3; ++c)
-          *out++ = stored(double{rows[std::size_t{row} * s.width + x][c]});
+          *out++ = texture::stored(double{rows[std::size_t{row} * s.width + x][c]});
     }
   }
   check_gl();
@@ -544,4 +547,4 @@ double render_gl_bytes(std::uint32_t width, std::uint32_t height, int samples) {
   return (3.0 + target) * width * height + 16.0 * 16 * width;
 }
 
-} // namespace gewebe
+} // namespace gewebe::gl

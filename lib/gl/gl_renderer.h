@@ -15,7 +15,7 @@
 #include <string_view>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::gl {
 
 enum class GlMode {
   passes3, ///< one texture unit: f, then 1 - f' added, then the colours blended to 2 r c
@@ -43,20 +43,20 @@ struct GlOptions {
 /// or fails; for passes1 also if base and structure aren't mapped alike
 class GlRenderer {
 public:
-  GlRenderer(GlContext& gl, const SurfaceMaterial& material, std::uint32_t width,
+  GlRenderer(GlContext& gl, const texture::SurfaceMaterial& material, std::uint32_t width,
              std::uint32_t height, const GlOptions& options);
   ~GlRenderer();
   GlRenderer(const GlRenderer&) = delete;
   GlRenderer& operator=(const GlRenderer&) = delete;
 
   /// \pre a mode of the fixed functions has no use for frames: there are none
-  void set_drawing(const Drawing& drawing);
+  void set_drawing(const shading::Drawing& drawing);
   /// Of a drawing whose vertices, frames and triangles are those that were set.
-  void set_light(const Drawing& drawing);
+  void set_light(const shading::Drawing& drawing);
   /// \throw Cancelled
-  void draw(const Projection& projection, const Context& context);
+  void draw(const shading::Projection& projection, const Context& context);
   void finish(); ///< waits until all is drawn
-  Image read(const Context& context);
+  texture::Image read(const Context& context);
 
   const std::string& target() const; ///< "RGBA32F", "RGBA16F", "RGBA8"
   int passes() const;                ///< of the last draw
@@ -69,4 +69,4 @@ private:
 /// Bytes that a picture needs, in main memory where OpenGL is software.
 double render_gl_bytes(std::uint32_t width, std::uint32_t height, int samples);
 
-} // namespace gewebe
+} // namespace gewebe::gl

@@ -7,7 +7,7 @@
 
 // Based on: report FZKA 7190, 2006, section 3.2.3, with the frame of eq. 3.2 at each pixel.
 
-namespace gewebe {
+namespace gewebe::gl {
 namespace {
 
 constexpr const char* vertex_source = R"(
@@ -171,13 +171,13 @@ void set(GLuint program, const char* name, const Vec3& v) {
 
 } // namespace
 
-GlShader::GlShader(const SurfaceMaterial& material, bool frames, bool rotated) {
-  const bool rest = is_at_rest(material);
+GlShader::GlShader(const texture::SurfaceMaterial& material, bool frames, bool rotated) {
+  const bool rest = texture::is_at_rest(material);
   std::string head = rest ? "#version 130\n" + rest_definitions(material) : "#version 120\n";
   head += rest && rotated ? "#define TURNED\n" : "";
   bool sphere = false;
-  const auto define = [&](const std::optional<Texture>& texture, const char* name) {
-    if (!texture || is_triplanar(material, texture))
+  const auto define = [&](const std::optional<texture::Texture>& texture, const char* name) {
+    if (!texture || texture::is_triplanar(material, texture))
       return;
     sphere = sphere || texture->options.sphere;
     head += std::string("#define ") + name + (texture->options.sphere ? " around\n" : " st\n");
@@ -210,7 +210,7 @@ GlShader::~GlShader() {
   glDeleteProgram(program_);
 }
 
-void GlShader::use(const Drawing& drawing, const SurfaceMaterial& material,
+void GlShader::use(const shading::Drawing& drawing, const texture::SurfaceMaterial& material,
                    const Vec3& surroundings) const {
   glUseProgram(program_);
   int unit = 0;
@@ -230,8 +230,8 @@ void GlShader::use(const Drawing& drawing, const SurfaceMaterial& material,
               static_cast<float>(alpha * alpha), static_cast<float>(material.film.reflectance),
               static_cast<float>(drawing.full_distance));
   set(program_, "mirrored_color", surroundings);
-  if (is_at_rest(material))
+  if (texture::is_at_rest(material))
     set_rest(program_, material, drawing);
 }
 
-} // namespace gewebe
+} // namespace gewebe::gl

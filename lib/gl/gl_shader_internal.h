@@ -8,7 +8,7 @@
 
 #include <string>
 
-namespace gewebe {
+namespace gewebe::gl {
 
 /// Textures are bound to units in this order.
 enum GlUnit { base_unit, detail_unit, reflection_unit, structure_unit };
@@ -18,13 +18,14 @@ enum GlUnit { base_unit, detail_unit, reflection_unit, structure_unit };
 class GlShader {
 public:
   /// \throw Error if OpenGL has no GLSL 1.20 or can't compile it
-  GlShader(const SurfaceMaterial& material, bool frames, bool rotated);
+  GlShader(const texture::SurfaceMaterial& material, bool frames, bool rotated);
   ~GlShader();
   GlShader(const GlShader&) = delete;
   GlShader& operator=(const GlShader&) = delete;
   /// \param surroundings what a film mirrors
   /// \pre `material` has textures as that which the program was made for, with values of its own
-  void use(const Drawing& drawing, const SurfaceMaterial& material, const Vec3& surroundings) const;
+  void use(const shading::Drawing& drawing, const texture::SurfaceMaterial& material,
+           const Vec3& surroundings) const;
 
 private:
   GLuint program_ = 0;
@@ -32,8 +33,9 @@ private:
 
 // Of textures on the shape at rest (gl_shader_rest.cpp): head and body of a fragment shader that
 // defines what `material` has as rest_base(), rest_detail(), rest_reflection() and rest_relief().
-std::string rest_definitions(const SurfaceMaterial& material);
-std::string rest_source(const SurfaceMaterial& material);
-void set_rest(GLuint program, const SurfaceMaterial& material, const Drawing& drawing);
+std::string rest_definitions(const texture::SurfaceMaterial& material);
+std::string rest_source(const texture::SurfaceMaterial& material);
+void set_rest(GLuint program, const texture::SurfaceMaterial& material,
+              const shading::Drawing& drawing);
 
-} // namespace gewebe
+} // namespace gewebe::gl

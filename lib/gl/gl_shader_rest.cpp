@@ -10,7 +10,7 @@
 // Textures on the shape at rest as a shader has them; the formulas stand in rest.h and
 // solid_texture.h.
 
-namespace gewebe {
+namespace gewebe::gl {
 namespace {
 
 constexpr const char* common_source = R"(
@@ -215,10 +215,10 @@ std::string with_name(std::string_view source, const std::string& name) {
 struct Layer {
   const char* name;
   const char* define;
-  const std::optional<Texture>& image;
-  const std::optional<SolidTexture>* solid;
+  const std::optional<texture::Texture>& image;
+  const std::optional<texture::SolidTexture>* solid;
 };
-std::array<Layer, 4> layers_of(const SurfaceMaterial& material) {
+std::array<Layer, 4> layers_of(const texture::SurfaceMaterial& material) {
   return {{{"base", "REST_BASE", material.base, &material.solid_base},
            {"detail", "REST_DETAIL", material.detail, &material.solid_detail},
            {"reflection", "REST_REFLECTION", material.reflection, nullptr},
@@ -231,29 +231,31 @@ bool is_solid(const Layer& layer) {
 
 } // namespace
 
-std::string rest_definitions(const SurfaceMaterial& material) {
+std::string rest_definitions(const texture::SurfaceMaterial& material) {
   std::string head = "#define REST\n#define SHARPNESS " + std::to_string(material.rest.sharpness) +
-                     "\n#define REACH " + std::to_string(1 / (vein_reach * vein_reach)) + "\n";
+                     "\n#define REACH " +
+                     std::to_string(1 / (texture::vein_reach * texture::vein_reach)) + "\n";
   for (const Layer& layer : layers_of(material)) {
-    if (!is_solid(layer) && !is_triplanar(material, layer.image))
+    if (!is_solid(layer) && !texture::is_triplanar(material, layer.image))
       continue;
     head += std::string("#define ") + layer.define + "\n";
     if (!is_solid(layer))
       continue;
-    const SolidTexture& solid = **layer.solid;
+    const texture::SolidTexture& solid = **layer.solid;
     head += with_name("#define @_OCTAVES ", layer.name) + std::to_string(solid.octaves) + "\n";
-    head += solid.kind == SolidKind::veins ? with_name("#define @_VEINS\n", layer.name) : "";
+    head +=
+        solid.kind == texture::SolidKind::veins ? with_name("#define @_VEINS\n", layer.name) : "";
     head += solid.filtered ? with_name("#define @_FILTERED\n", layer.name) : "";
   }
   return head;
 }
 
-std::string rest_source(const SurfaceMaterial& material) {
+std::string rest_source(const texture::SurfaceMaterial& material) {
   std::string source = common_source;
   bool noise = false, images = false;
   for (const Layer& layer : layers_of(material)) {
     noise = noise || is_solid(layer);
-    images = images || is_triplanar(material, layer.image);
+    images = images || texture::is_triplanar(material, layer.image);
   }
   source += noise ? noise_source : "";
   source += images ? triplanar_source : "";
@@ -271,7 +273,7 @@ float rest_relief() {
 }
 )"
                        : "vec3 rest_" + name + "() { return " + name + "_color(); }\n";
-    } else if (is_triplanar(material, layer.image)) {
+    } else if (texture::is_triplanar(material, layer.image)) {
       source += relief ? "float rest_relief() { return read_relief(structure); }\n"
                        : "vec3 rest_" + name + "() { return read_all(" + name + "); }\n";
     }
@@ -279,7 +281,8 @@ float rest_relief() {
   return source;
 }
 
-void set_rest(GLuint program, const SurfaceMaterial& material, const Drawing& drawing) {
+void set_rest(GLuint program, const texture::SurfaceMaterial& material,
+              const shading::Drawing& drawing) {
   const auto place = [&](const std::string& name) {
     return glGetUniformLocation(program, name.c_str());
   };
@@ -293,8 +296,9 @@ void set_rest(GLuint program, const SurfaceMaterial& material, const Drawing& dr
     if (!is_solid(layer))
       continue;
     const std::string name = std::string(layer.name) + "_";
-    const SolidPlan plan = solid_plan(**layer.solid, drawing.rest_origin, drawing.rest_scale);
-    constexpr int octaves = solid_octaves + 1;
+    const texture::SolidPlan plan =
+        texture::solid_plan(**layer.solid, drawing.rest_origin, drawing.rest_scale);
+    constexpr int octaves = texture::solid_octaves + 1;
     glUniformMatrix3fv(place(name + "rows"), 1, GL_TRUE, &plan.rows[0][0]);
     glUniform3fv(place(name + "part"), 1, plan.part);
     glUniform3fv(place(name + "ground"), 1, plan.ground);
@@ -313,4 +317,4 @@ void set_rest(GLuint program, const SurfaceMaterial& material, const Drawing& dr
   }
 }
 
-} // namespace gewebe
+} // namespace gewebe::gl

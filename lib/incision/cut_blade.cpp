@@ -9,7 +9,7 @@
 #include <string>
 #include <utility>
 
-namespace gewebe {
+namespace gewebe::incision {
 namespace {
 
 std::string edge_name(std::uint32_t a, std::uint32_t b) {
@@ -68,13 +68,13 @@ Blade::Blade(const TriangleMesh& surface) {
     }
     leaves_.push_back(leaf);
   }
-  EdgeSides(points_.size(), surface.triangles)
-      .for_each_edge([&](std::uint32_t low, std::span<const EdgeSide> sides) {
+  mesh::EdgeSides(points_.size(), surface.triangles)
+      .for_each_edge([&](std::uint32_t low, std::span<const mesh::EdgeSide> sides) {
         const std::uint32_t high = sides.front().high();
         if (sides.size() > 2)
           throw Error(edge_name(low, high) + " has " + std::to_string(sides.size()) +
                       " triangles, expected one or two");
-        if (sides.size() == 2 && surplus(sides) != 0)
+        if (sides.size() == 2 && mesh::surplus(sides) != 0)
           throw Error(edge_name(low, high) +
                       " has two triangles that run along it the same way, expected one sheet with "
                       "one upper side");
@@ -141,4 +141,4 @@ BladeCrossing Blade::crossing(const Vec3& from, const Vec3& to) const {
   return crossing;
 }
 
-} // namespace gewebe
+} // namespace gewebe::incision

@@ -11,7 +11,7 @@
 #include <optional>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::incision {
 
 /// Intersection of an edge with the surface.
 struct BladeCrossing {
@@ -58,4 +58,4 @@ private:
   collision::Bvh tree_; // of the leaves
 };
 
-} // namespace gewebe
+} // namespace gewebe::incision

@@ -4,7 +4,7 @@
 
 #include <algorithm>
 
-namespace gewebe {
+namespace gewebe::incision {
 namespace {
 
 std::vector<NodeLink::Vertex> vertices_of(const std::vector<NodeLink::Face>& faces) {
@@ -146,4 +146,4 @@ std::vector<std::uint32_t> NodeLink::ways_across(std::size_t most) const {
   return Crossing(faces_).ways(most);
 }
 
-} // namespace gewebe
+} // namespace gewebe::incision

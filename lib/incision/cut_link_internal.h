@@ -6,7 +6,7 @@
 #include <cstdint>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::incision {
 
 /// A surface of triangles on the sphere: one for each tetrahedron at the node, with an edge for
 /// each face and a vertex for each edge of the solid there.
@@ -38,4 +38,4 @@ private:
   std::size_t tetrahedra_ = 0;
 };
 
-} // namespace gewebe
+} // namespace gewebe::incision

@@ -12,7 +12,7 @@
 #include <utility>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::incision {
 namespace {
 
 using Ends = std::array<std::uint32_t, 2>;
@@ -39,7 +39,7 @@ struct EdgeBefore {
 
 std::size_t edge_between(std::size_t a, std::size_t b) {
   std::size_t k = 0;
-  while (ascending(tetrahedron_edges[k][0], tetrahedron_edges[k][1]) !=
+  while (ascending(tetrahedra::tetrahedron_edges[k][0], tetrahedra::tetrahedron_edges[k][1]) !=
          ascending(static_cast<std::uint32_t>(a), static_cast<std::uint32_t>(b)))
     ++k;
   return k;
@@ -47,7 +47,7 @@ std::size_t edge_between(std::size_t a, std::size_t b) {
 
 class Adder {
 public:
-  Adder(const TetMesh& before, std::span<const std::uint32_t> original, TetCut& cut)
+  Adder(const tetrahedra::TetMesh& before, std::span<const std::uint32_t> original, TetCut& cut)
       : before_(before), original_(original), cut_(cut), changed_(before.tetrahedra.size()) {
     for (const std::uint32_t t : cut.changed)
       changed_[t] = true;
@@ -73,8 +73,8 @@ private:
   void gather() {
     for (const std::uint32_t t : cut_.changed)
       for (std::size_t k = 0; k < 6; ++k)
-        old_.push_back({ascending(before_.tetrahedra[t][tetrahedron_edges[k][0]],
-                                  before_.tetrahedra[t][tetrahedron_edges[k][1]]),
+        old_.push_back({ascending(before_.tetrahedra[t][tetrahedra::tetrahedron_edges[k][0]],
+                                  before_.tetrahedra[t][tetrahedra::tetrahedron_edges[k][1]]),
                         before_.middles[t][k]});
     std::ranges::sort(old_);
     elsewhere_.resize(before_.points.size());
@@ -85,8 +85,8 @@ private:
         continue;
       }
       for (std::uint32_t k = 0; k < 6; ++k) {
-        const std::uint32_t a = cut_.mesh.tetrahedra[t][tetrahedron_edges[k][0]],
-                            b = cut_.mesh.tetrahedra[t][tetrahedron_edges[k][1]];
+        const std::uint32_t a = cut_.mesh.tetrahedra[t][tetrahedra::tetrahedron_edges[k][0]],
+                            b = cut_.mesh.tetrahedra[t][tetrahedra::tetrahedron_edges[k][1]];
         edges_.push_back({ascending(original_[a], original_[b]), ascending(a, b), t, k});
       }
     }
@@ -182,13 +182,13 @@ private:
     std::array<Vec3, 4> p;
     for (std::size_t k = 0; k < 4; ++k)
       p[k] = before_.points[before_.tetrahedra[t][k]];
-    const double whole = tetrahedron_volume(p[0], p[1], p[2], p[3]);
+    const double whole = tetrahedra::tetrahedron_volume(p[0], p[1], p[2], p[3]);
     std::array<double, 4> weights{};
     double rest = 1;
     for (std::size_t k = 1; k < 4; ++k) {
       std::array<Vec3, 4> q = p;
       q[k] = place;
-      weights[k] = tetrahedron_volume(q[0], q[1], q[2], q[3]) / whole;
+      weights[k] = tetrahedra::tetrahedron_volume(q[0], q[1], q[2], q[3]) / whole;
       rest -= weights[k];
     }
     weights[0] = rest;
@@ -206,7 +206,7 @@ private:
             middles[edge_between(at[2], at[0])]};
   }
 
-  const TetMesh& before_;
+  const tetrahedra::TetMesh& before_;
   std::span<const std::uint32_t> original_;
   TetCut& cut_;
   std::vector<bool> changed_;           // tetrahedra before
@@ -218,24 +218,25 @@ private:
 
 } // namespace
 
-void check_straight(const TetMesh& mesh, const CutRegion& region) {
+void check_straight(const tetrahedra::TetMesh& mesh, const CutRegion& region) {
   for (const RegionTet& tet : region.tets)
     for (std::size_t k = 0; k < 6; ++k) {
-      const std::uint32_t a = mesh.tetrahedra[tet.number][tetrahedron_edges[k][0]],
-                          b = mesh.tetrahedra[tet.number][tetrahedron_edges[k][1]];
+      const std::uint32_t a = mesh.tetrahedra[tet.number][tetrahedra::tetrahedron_edges[k][0]],
+                          b = mesh.tetrahedra[tet.number][tetrahedra::tetrahedron_edges[k][1]];
       const Vec3 &p = mesh.points[a], &q = mesh.points[b];
       const Vec3& middle = mesh.points[mesh.middles[tet.number][k]];
-      if (!(norm(middle - (p + q) * 0.5) <= curved_edge * norm(q - p)))
+      if (!(norm(middle - (p + q) * 0.5) <= tetrahedra::curved_edge * norm(q - p)))
         throw Error("the edge from node " + std::to_string(a) + " to " + std::to_string(b) +
                     " near the blade is curved, expected straight ones");
     }
 }
 
-void add_middles(const TetMesh& before, std::span<const std::uint32_t> original, TetCut& cut) {
+void add_middles(const tetrahedra::TetMesh& before, std::span<const std::uint32_t> original,
+                 TetCut& cut) {
   Adder(before, original, cut).add();
 }
 
-std::vector<std::pair<std::uint32_t, double>> shares_of(const TetMesh& before,
+std::vector<std::pair<std::uint32_t, double>> shares_of(const tetrahedra::TetMesh& before,
                                                         const TetNodeOrigin& origin) {
   if (origin.node != TetNodeOrigin::none)
     return {{origin.node, 1}};
@@ -253,12 +254,12 @@ std::vector<std::pair<std::uint32_t, double>> shares_of(const TetMesh& before,
     add(before.tetrahedra[origin.tetrahedron][k], quadratic ? w[k] * (2 * w[k] - 1) : w[k]);
   for (std::size_t k = 0; quadratic && k < 6; ++k)
     add(before.middles[origin.tetrahedron][k],
-        4 * w[tetrahedron_edges[k][0]] * w[tetrahedron_edges[k][1]]);
+        4 * w[tetrahedra::tetrahedron_edges[k][0]] * w[tetrahedra::tetrahedron_edges[k][1]]);
   return shares;
 }
 
-std::vector<Vec3> carry_over(const TetMesh& before, std::span<const TetNodeOrigin> origin,
-                             std::span<const Vec3> field) {
+std::vector<Vec3> carry_over(const tetrahedra::TetMesh& before,
+                             std::span<const TetNodeOrigin> origin, std::span<const Vec3> field) {
   std::vector<Vec3> carried;
   carried.reserve(origin.size());
   for (const TetNodeOrigin& from : origin) {
@@ -274,4 +275,4 @@ std::vector<Vec3> carry_over(const TetMesh& before, std::span<const TetNodeOrigi
   return carried;
 }
 
-} // namespace gewebe
+} // namespace gewebe::incision

@@ -7,10 +7,10 @@
 #include <cstdint>
 #include <span>
 
-namespace gewebe {
+namespace gewebe::incision {
 
 /// \throw Error if an edge of the region is curved
-void check_straight(const TetMesh& mesh, const CutRegion& region);
+void check_straight(const tetrahedra::TetMesh& mesh, const CutRegion& region);
 
 /// Adds middles of edges to all changed tetrahedra, to the wall and the surface. Edges between
 /// nodes that were joined before keep their middles, copies of such edges get copies, other edges
@@ -18,6 +18,7 @@ void check_straight(const TetMesh& mesh, const CutRegion& region);
 /// \param original  by corner: the former node that it is, or is a copy of
 /// \pre `cut` has its corners, and the former middles of the former tetrahedra
 /// \throw Error if there are too many nodes
-void add_middles(const TetMesh& before, std::span<const std::uint32_t> original, TetCut& cut);
+void add_middles(const tetrahedra::TetMesh& before, std::span<const std::uint32_t> original,
+                 TetCut& cut);
 
-} // namespace gewebe
+} // namespace gewebe::incision

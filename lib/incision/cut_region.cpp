@@ -11,7 +11,7 @@
 #include <string>
 #include <utility>
 
-namespace gewebe {
+namespace gewebe::incision {
 namespace {
 
 /// An edge of a candidate.
@@ -40,7 +40,7 @@ struct Candidate {
 
 class Finder {
 public:
-  Finder(const TetMesh& mesh, const BladeCutOptions& options, const Blade& blade)
+  Finder(const tetrahedra::TetMesh& mesh, const BladeCutOptions& options, const Blade& blade)
       : mesh_(mesh),
         places_(options.places.empty() ? std::span<const Vec3>(mesh.points) : options.places),
         among_(options.among), blade_(blade) {}
@@ -96,8 +96,8 @@ private:
     for (std::size_t c = 0; c < candidates_.size(); ++c) {
       const Tetrahedron& t = mesh_.tetrahedra[candidates_[c].number];
       for (std::size_t k = 0; k < 6; ++k) {
-        const auto [low, high] =
-            std::minmax(t[tetrahedron_edges[k][0]], t[tetrahedron_edges[k][1]]);
+        const auto [low, high] = std::minmax(t[tetrahedra::tetrahedron_edges[k][0]],
+                                             t[tetrahedra::tetrahedron_edges[k][1]]);
         uses.push_back({low, high, static_cast<std::uint32_t>(6 * c + k)});
       }
     }
@@ -135,7 +135,7 @@ private:
       if (candidate.crossing[k] == no_crossing)
         continue;
       const Passed& edge = passed_[candidate.crossing[k]];
-      for (const std::uint8_t c : tetrahedron_edges[k]) {
+      for (const std::uint8_t c : tetrahedra::tetrahedron_edges[k]) {
         const std::int8_t above = (t[c] == edge.high) == (edge.direction > 0) ? 1 : -1;
         if (side[c] == -above)
           return;
@@ -143,7 +143,7 @@ private:
       }
     }
     for (std::size_t k = 0; k < 6; ++k) {
-      const auto& [a, b] = tetrahedron_edges[k];
+      const auto& [a, b] = tetrahedra::tetrahedron_edges[k];
       if (side[a] == 0 || side[b] == 0 ||
           (side[a] != side[b]) != (candidate.crossing[k] != no_crossing))
         return;
@@ -257,7 +257,7 @@ private:
         region_.star[next[corner]++] = r;
   }
 
-  const TetMesh& mesh_;
+  const tetrahedra::TetMesh& mesh_;
   std::span<const Vec3> places_;
   std::span<const std::uint8_t> among_;
   const Blade& blade_;
@@ -268,9 +268,9 @@ private:
 
 } // namespace
 
-CutRegion cut_region(const TetMesh& mesh, const BladeCutOptions& options, const Blade& blade,
-                     bool wide) {
+CutRegion cut_region(const tetrahedra::TetMesh& mesh, const BladeCutOptions& options,
+                     const Blade& blade, bool wide) {
   return Finder(mesh, options, blade).find(wide);
 }
 
-} // namespace gewebe
+} // namespace gewebe::incision

@@ -11,7 +11,7 @@
 #include <span>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::incision {
 
 inline constexpr std::uint32_t no_crossing = UINT32_MAX;
 
@@ -65,7 +65,7 @@ struct CutRegion {
 /// \param wide  also the neighbours of the tetrahedra at the ends of crossed edges
 /// \pre check_mesh(mesh) passes; options as for cut_tetrahedra
 /// \throw Error as cut_tetrahedra
-CutRegion cut_region(const TetMesh& mesh, const BladeCutOptions& options, const Blade& blade,
-                     bool wide);
+CutRegion cut_region(const tetrahedra::TetMesh& mesh, const BladeCutOptions& options,
+                     const Blade& blade, bool wide);
 
-} // namespace gewebe
+} // namespace gewebe::incision

@@ -12,7 +12,7 @@
 #include <optional>
 #include <string>
 
-namespace gewebe {
+namespace gewebe::incision {
 namespace {
 
 /// A node stands on the blade if a crossing is nearer than this share of its edge.
@@ -48,7 +48,7 @@ struct FaceAt {
 
 class Snapper {
 public:
-  Snapper(const TetMesh& mesh, const CutRegion& region, const BladeCutOptions& options)
+  Snapper(const tetrahedra::TetMesh& mesh, const CutRegion& region, const BladeCutOptions& options)
       : mesh_(mesh), region_(region), options_(options) {
     for (const std::uint32_t node : region.nodes)
       result_.points.push_back(mesh.points[node]);
@@ -240,7 +240,7 @@ private:
           continue;
         std::array<std::uint32_t, 2> others{};
         std::size_t count = 0;
-        for (const std::uint8_t c : tetrahedron_faces[k])
+        for (const std::uint8_t c : tetrahedra::tetrahedron_faces[k])
           if (t[c] != node)
             others[count++] = t[c];
         const auto [low, high] = std::minmax(others[0], others[1]);
@@ -286,7 +286,7 @@ private:
     return std::fabs(dot(normal, step)) <= rounding * size * norm(normal);
   }
 
-  const TetMesh& mesh_;
+  const tetrahedra::TetMesh& mesh_;
   const CutRegion& region_;
   const BladeCutOptions& options_;
   std::vector<bool> held_;
@@ -314,9 +314,9 @@ std::vector<EdgeNode> edge_nodes(const CutRegion& region, const std::vector<bool
   return nodes;
 }
 
-SnappedRegion snap_region(const TetMesh& mesh, const CutRegion& region,
+SnappedRegion snap_region(const tetrahedra::TetMesh& mesh, const CutRegion& region,
                           const BladeCutOptions& options) {
   return Snapper(mesh, region, options).snap();
 }
 
-} // namespace gewebe
+} // namespace gewebe::incision

@@ -8,7 +8,7 @@
 #include <span>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::incision {
 
 /// By local nodes.
 struct SnappedRegion {
@@ -25,7 +25,7 @@ std::vector<EdgeNode> edge_nodes(const CutRegion& region, const std::vector<bool
                                  const RegionTet& tet);
 
 /// \throw Error as cut_tetrahedra, of the region
-SnappedRegion snap_region(const TetMesh& mesh, const CutRegion& region,
+SnappedRegion snap_region(const tetrahedra::TetMesh& mesh, const CutRegion& region,
                           const BladeCutOptions& options);
 
-} // namespace gewebe
+} // namespace gewebe::incision

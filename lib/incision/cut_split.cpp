@@ -2,7 +2,7 @@
 
 #include <cmath>
 
-namespace gewebe {
+namespace gewebe::incision {
 
 double sharpness(const Vec3& a, const Vec3& b, const Vec3& c, const Vec3& d) {
   const Vec3 ab = b - a, ac = c - a, ad = d - a, bc = c - b, bd = d - b;
@@ -23,4 +23,4 @@ double sharpness(const Vec3& a, const Vec3& b, const Vec3& c, const Vec3& d) {
   return std::sqrt(largest);
 }
 
-} // namespace gewebe
+} // namespace gewebe::incision

@@ -9,7 +9,7 @@
 #include <cstdint>
 #include <span>
 
-namespace gewebe {
+namespace gewebe::incision {
 
 /// The largest |cos| of a dihedral angle; 2 without a positive volume.
 double sharpness(const Vec3& a, const Vec3& b, const Vec3& c, const Vec3& d);
@@ -45,4 +45,4 @@ void split_tetrahedron(const Tetrahedron& corners, std::span<const EdgeNode> nod
   visit(corners);
 }
 
-} // namespace gewebe
+} // namespace gewebe::incision

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cstddef>
 
-namespace gewebe {
+namespace gewebe::incision {
 
 std::uint32_t face_of(std::span<const TetSupport, 3> nodes) {
   std::uint32_t k = 0;
@@ -23,4 +23,4 @@ std::array<double, 3> weights_in_face(const std::array<Vec3, 3>& corners, const 
   return {1 - at_b - at_c, at_b, at_c};
 }
 
-} // namespace gewebe
+} // namespace gewebe::incision

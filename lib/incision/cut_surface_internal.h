@@ -7,7 +7,7 @@
 #include <cstdint>
 #include <span>
 
-namespace gewebe {
+namespace gewebe::incision {
 
 /// Corners of a tetrahedron between which a node stands.
 using TetSupport = std::array<bool, 4>;
@@ -18,4 +18,4 @@ std::uint32_t face_of(std::span<const TetSupport, 3> nodes);
 /// Barycentric coordinates of a place in the plane of a triangle, or of the nearest one.
 std::array<double, 3> weights_in_face(const std::array<Vec3, 3>& corners, const Vec3& place);
 
-} // namespace gewebe
+} // namespace gewebe::incision

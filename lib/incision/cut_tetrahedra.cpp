@@ -16,10 +16,10 @@
 #include <string>
 #include <utility>
 
-namespace gewebe {
+namespace gewebe::incision {
 namespace {
 
-void check(const TetMesh& mesh, const BladeCutOptions& options) {
+void check(const tetrahedra::TetMesh& mesh, const BladeCutOptions& options) {
   if (!options.places.empty() && options.places.size() != mesh.points.size())
     throw Error(std::to_string(options.places.size()) +
                 " places, expected none or one for each of "
@@ -48,7 +48,7 @@ void check(const TetMesh& mesh, const BladeCutOptions& options) {
 /// Writes the parts of a region back into the mesh.
 class Assembler {
 public:
-  Assembler(const TetMesh& mesh, const CutRegion& region, const SnappedRegion& snapped,
+  Assembler(const tetrahedra::TetMesh& mesh, const CutRegion& region, const SnappedRegion& snapped,
             const PartedRegion& parted)
       : before_(mesh), region_(region), snapped_(snapped), parted_(parted) {
     cut_.mesh = mesh;
@@ -198,7 +198,7 @@ private:
         WallTriangle wall;
         // Turned so that corner c here is 2 - c there.
         for (std::size_t c = 0; c < 3; ++c) {
-          const std::size_t here = tetrahedron_faces[k][c];
+          const std::size_t here = tetrahedra::tetrahedron_faces[k][c];
           wall.corners[0][c] = node_at(part, here);
           const auto there = std::ranges::find(beyond.corners, part.corners[here]);
           wall.corners[1][2 - c] =
@@ -223,7 +223,7 @@ private:
     for (std::uint32_t p = 0; p < parted_.parts.size(); ++p)
       for (std::uint32_t k = 0; k < 4; ++k) {
         const TetPart& part = parted_.parts[p];
-        const Triangle face = corners_of_face(part.corners, k);
+        const Triangle face = tetrahedra::corners_of_face(part.corners, k);
         if (part.neighbour[k] == no_neighbour && std::ranges::any_of(face, is_known))
           cut_.surface.push_back(surface_face(part, k, number_of_part_[p]));
       }
@@ -235,13 +235,13 @@ private:
     CutFace face;
     face.tetrahedron = tetrahedron;
     for (std::size_t c = 0; c < 3; ++c) {
-      const std::size_t corner = tetrahedron_faces[k][c];
+      const std::size_t corner = tetrahedra::tetrahedron_faces[k][c];
       face.corners[c] = node_at(part, corner);
       supports[c] = support_of(part.corners[corner], tet);
     }
     const std::uint32_t before = face_of(supports);
     face.face_before = 4 * tet.number + before;
-    const Triangle corners = corners_of_face(before_.tetrahedra[tet.number], before);
+    const Triangle corners = tetrahedra::corners_of_face(before_.tetrahedra[tet.number], before);
     for (std::size_t c = 0; c < 3; ++c)
       face.weights[c] = weights_in_face(
           {before_.points[corners[0]], before_.points[corners[1]], before_.points[corners[2]]},
@@ -265,7 +265,7 @@ private:
     return part.side != 0 ? part.side > 0 : beyond.side < 0;
   }
 
-  const TetMesh& before_;
+  const tetrahedra::TetMesh& before_;
   const CutRegion& region_;
   const SnappedRegion& snapped_;
   const PartedRegion& parted_;
@@ -277,7 +277,7 @@ private:
 };
 
 /// Cuts near the blade; empty if a wider neighbourhood of the blade is needed.
-std::optional<TetCut> cut_near(const TetMesh& mesh, const Blade& blade,
+std::optional<TetCut> cut_near(const tetrahedra::TetMesh& mesh, const Blade& blade,
                                const BladeCutOptions& options, bool wide) {
   const CutRegion region = cut_region(mesh, options, blade, wide);
   if (!mesh.middles.empty())
@@ -291,7 +291,7 @@ std::optional<TetCut> cut_near(const TetMesh& mesh, const Blade& blade,
 
 } // namespace
 
-TetCut cut_tetrahedra(const TetMesh& mesh, const TriangleMesh& blade,
+TetCut cut_tetrahedra(const tetrahedra::TetMesh& mesh, const TriangleMesh& blade,
                       const BladeCutOptions& options) {
   check(mesh, options);
   const Blade swept(blade);
@@ -300,4 +300,4 @@ TetCut cut_tetrahedra(const TetMesh& mesh, const TriangleMesh& blade,
   return cut ? std::move(*cut) : std::move(*cut_near(mesh, swept, options, true));
 }
 
-} // namespace gewebe
+} // namespace gewebe::incision

@@ -18,7 +18,7 @@
 #include <utility>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::incision {
 
 /// Degrees. Dihedral angles of tetrahedra that a cut has changed lie between this and 180 minus
 /// this, or those of the tetrahedron before do not either, and are no worse.
@@ -92,7 +92,7 @@ struct BladeCutReport {
 /// tetrahedron keeps its number. New nodes come after the former ones: nodes in edges, by the ends
 /// of the edges, then copies, by their nodes. Other parts of tetrahedra follow by tetrahedron.
 struct TetCut {
-  TetMesh mesh;
+  tetrahedra::TetMesh mesh;
   std::vector<TetNodeOrigin> origin;      ///< by node
   std::vector<std::uint32_t> tetrahedron; ///< by tetrahedron: the former one that it is (a part of)
   std::vector<WallTriangle> wall;
@@ -134,17 +134,17 @@ struct TetCut {
 /// has no positive volume; if a point of the blade or a place is not finite or too far away (2^40
 /// mm); if the blade has an edge with three triangles, or two that run along it the same way; if an
 /// option is out of its range; if there are too many nodes or tetrahedra
-TetCut cut_tetrahedra(const TetMesh& mesh, const TriangleMesh& blade,
+TetCut cut_tetrahedra(const tetrahedra::TetMesh& mesh, const TriangleMesh& blade,
                       const BladeCutOptions& options = {});
 
 /// Former nodes that determine the value at a new node by the shape functions of the element, with
 /// their shares, sum 1. No share is 0.
-std::vector<std::pair<std::uint32_t, double>> shares_of(const TetMesh& before,
+std::vector<std::pair<std::uint32_t, double>> shares_of(const tetrahedra::TetMesh& before,
                                                         const TetNodeOrigin& origin);
 
 /// Interpolates a field from the former nodes to those of the cut mesh, by the shape functions of
 /// the former elements. \pre `field` has one value per former node
-std::vector<Vec3> carry_over(const TetMesh& before, std::span<const TetNodeOrigin> origin,
-                             std::span<const Vec3> field);
+std::vector<Vec3> carry_over(const tetrahedra::TetMesh& before,
+                             std::span<const TetNodeOrigin> origin, std::span<const Vec3> field);
 
-} // namespace gewebe
+} // namespace gewebe::incision

@@ -9,7 +9,7 @@
 #include <span>
 #include <utility>
 
-namespace gewebe {
+namespace gewebe::incision {
 namespace {
 
 struct PartFace {
@@ -80,7 +80,7 @@ private:
     faces.reserve(4 * result_.parts.size());
     for (std::uint32_t p = 0; p < result_.parts.size(); ++p)
       for (std::uint32_t k = 0; k < 4; ++k) {
-        Triangle corners = corners_of_face(result_.parts[p].corners, k);
+        Triangle corners = tetrahedra::corners_of_face(result_.parts[p].corners, k);
         std::ranges::sort(corners);
         faces.push_back({corners, 4 * p + k});
       }
@@ -112,7 +112,7 @@ private:
         const std::uint32_t other = part.neighbour[k];
         if (other == no_neighbour || other / 4 < p)
           continue;
-        const Triangle face = corners_of_face(part.corners, k);
+        const Triangle face = tetrahedra::corners_of_face(part.corners, k);
         if (!std::ranges::all_of(face, [&](std::uint32_t node) { return on_blade(node); }))
           continue;
         TetPart& beyond = result_.parts[other / 4];
@@ -160,7 +160,7 @@ private:
       part.piece.fill(0);
       for (std::uint32_t k = 0; k < 4; ++k)
         if (part.wall[k]) {
-          const Triangle face = corners_of_face(part.corners, k);
+          const Triangle face = tetrahedra::corners_of_face(part.corners, k);
           nodes.insert(nodes.end(), face.begin(), face.end());
         }
     }
@@ -237,7 +237,7 @@ private:
   }
 
   double volume_of(const Tetrahedron& t) const {
-    return tetrahedron_volume(place(t[0]), place(t[1]), place(t[2]), place(t[3]));
+    return tetrahedra::tetrahedron_volume(place(t[0]), place(t[1]), place(t[2]), place(t[3]));
   }
 
   /// A face of the wall with the same nodes on both sides is none.
@@ -312,10 +312,11 @@ private:
 
   /// Are all tetrahedra at the corners of a face in the region?
   bool is_known(std::uint32_t number) const {
-    return std::ranges::all_of(corners_of_face(result_.parts[number / 4].corners, number % 4),
-                               [&](std::uint32_t node) {
-                                 return node >= region_.whole.size() || region_.whole[node] != 0;
-                               });
+    return std::ranges::all_of(
+        tetrahedra::corners_of_face(result_.parts[number / 4].corners, number % 4),
+        [&](std::uint32_t node) {
+          return node >= region_.whole.size() || region_.whole[node] != 0;
+        });
   }
 
   NodeLink link_of(std::span<const Use> uses, std::uint32_t number) {
@@ -356,4 +357,4 @@ PartedRegion part_region(const CutRegion& region, const SnappedRegion& snapped) 
   return Parter(region, snapped).part();
 }
 
-} // namespace gewebe
+} // namespace gewebe::incision

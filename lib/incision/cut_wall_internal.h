@@ -9,7 +9,7 @@
 #include <cstdint>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::incision {
 
 /// Nodes are local ones, then crossings.
 struct TetPart {
@@ -38,4 +38,4 @@ struct PartedRegion {
 /// \throw Error if there are too many parts
 PartedRegion part_region(const CutRegion& region, const SnappedRegion& snapped);
 
-} // namespace gewebe
+} // namespace gewebe::incision

@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-namespace gewebe {
+namespace gewebe::integrator {
 
 bool MotionState::any_held() const {
   return std::ranges::any_of(held, [](std::uint8_t h) { return h != 0; });
@@ -22,4 +22,4 @@ double work_of_load(const MotionBody& body, const Numbers& load, const Numbers& 
   return sum;
 }
 
-} // namespace gewebe
+} // namespace gewebe::integrator

@@ -9,11 +9,11 @@
 #include <cstdint>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::integrator {
 
 struct MotionBody {
-  TetMesh mesh;
-  std::vector<SolidElement> elements;
+  tetrahedra::TetMesh mesh;
+  std::vector<fem::SolidElement> elements;
   Numbers masses;                        ///< by node
   Numbers drag;                          ///< by node, per mass, 1/s
   Numbers rest;                          ///< places
@@ -38,4 +38,4 @@ double motion_energy(const MotionBody& body, const Numbers& v);
 /// From rest to the places.
 double work_of_load(const MotionBody& body, const Numbers& load, const Numbers& places);
 
-} // namespace gewebe
+} // namespace gewebe::integrator

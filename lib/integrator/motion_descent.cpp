@@ -10,7 +10,7 @@
 #include <functional>
 #include <utility>
 
-namespace gewebe {
+namespace gewebe::integrator {
 
 namespace {
 
@@ -250,7 +250,7 @@ void descend_to_rest(const MotionObjective& objective, MotionPoint& now, MotionQ
         tangent.make(objective, at, context);
         exact = true;
         return true;
-      } catch (const NotPositiveDefinite&) {
+      } catch (const linalg::NotPositiveDefinite&) {
         exact = false; // what is torn far apart has no tangent in numbers of this length
       }
     }
@@ -261,7 +261,7 @@ void descend_to_rest(const MotionObjective& objective, MotionPoint& now, MotionQ
     return false;
   };
   const auto in_frames = [&](auto&& change) {
-    return [&, change](Numbers& v) {
+    return [&, change](gewebe::integrator::Numbers& v) {
       if (!exact)
         change(v);
     };
@@ -291,4 +291,4 @@ void descend_to_rest(const MotionObjective& objective, MotionPoint& now, MotionQ
     secants.clear(); // they stand in the fixed frame
 }
 
-} // namespace gewebe
+} // namespace gewebe::integrator

@@ -6,7 +6,7 @@
 #include "integrator/motion_quick_internal.h"
 #include "integrator/motion_tangent_internal.h"
 
-namespace gewebe {
+namespace gewebe::integrator {
 
 /// From `now`, evaluated with turns, until the last round's change is within the tolerance, the
 /// rounds have run out or nothing is to be gained. \pre quick is prepared \throw as Factor;
@@ -37,4 +37,4 @@ void newton_to_rest(const MotionObjective& objective, MotionPoint& now, const Nu
                     MotionTangent& tangent, bool& exact, const SolidMotionOptions& options,
                     SolidStep& step, const Context& context);
 
-} // namespace gewebe
+} // namespace gewebe::integrator

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <utility>
 
-namespace gewebe {
+namespace gewebe::integrator {
 
 void MotionForecast::add(Numbers acceleration, const Numbers& masses, const Context& context) {
   for (std::size_t i = most; i-- > 1;)
@@ -66,8 +66,8 @@ void MotionForecast::add_to(Numbers& to, double factor, const Context& context) 
   const std::array<double, terms> weight = weights();
   parallel_blocks(context, to.size(), axes_grain, [&](std::size_t begin, std::size_t end) {
     for (std::size_t k = 0; k < std::min(terms, past_.size()); ++k)
-      gewebe::add(std::span(to).subspan(begin, end - begin), factor * weight[k],
-                  std::span(*past_[k]).subspan(begin, end - begin));
+      gewebe::integrator::add(std::span(to).subspan(begin, end - begin), factor * weight[k],
+                              std::span(*past_[k]).subspan(begin, end - begin));
   });
 }
 
@@ -77,4 +77,4 @@ void MotionForecast::hold(std::size_t axis) {
       one.write()[axis] = 0;
 }
 
-} // namespace gewebe
+} // namespace gewebe::integrator

@@ -8,7 +8,7 @@
 #include <cstddef>
 #include <deque>
 
-namespace gewebe {
+namespace gewebe::integrator {
 
 /// Foretells a step's acceleration from those of the last ones, as the sum of three of them that
 /// would have foretold the last one best (linear prediction: Makhoul, Linear prediction, Proc. IEEE
@@ -31,4 +31,4 @@ private:
   std::array<std::array<double, most>, most> product_{}; ///< of them, by masses
 };
 
-} // namespace gewebe
+} // namespace gewebe::integrator

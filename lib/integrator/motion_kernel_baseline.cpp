@@ -1,7 +1,7 @@
 #include "integrator/motion_kernel_body_internal.h"
 
-namespace gewebe {
+namespace gewebe::integrator {
 
 const MotionKernel motion_kernel_baseline{&pull, &product, &increase};
 
-} // namespace gewebe
+} // namespace gewebe::integrator

@@ -8,7 +8,7 @@
 #include <cmath>
 #include <cstddef>
 
-namespace gewebe {
+namespace gewebe::integrator {
 namespace {
 
 // Loops over a whole batch have a length that compilers know, so that they take several at a time.
@@ -62,11 +62,11 @@ inline void pull(const SpringColumns& springs, const double* at, double per_time
 }
 
 inline double product(const float* a, const double* b, std::size_t count) {
-  Four sum{}, values;
+  numeric::Four sum{}, values;
   std::size_t k = 0;
   for (; k + 4 <= count; k += 4) {
-    load(a + k, values);
-    sum += values * four(b + k);
+    numeric::load(a + k, values);
+    sum += values * numeric::four(b + k);
   }
   for (; k < count; ++k)
     sum[0] += static_cast<double>(a[k]) * b[k];
@@ -74,15 +74,15 @@ inline double product(const float* a, const double* b, std::size_t count) {
 }
 
 inline void increase(double* to, double factor, const float* of, std::size_t count) {
-  Four values;
+  numeric::Four values;
   std::size_t k = 0;
   for (; k + 4 <= count; k += 4) {
-    load(of + k, values);
-    four(to + k) += factor * values;
+    numeric::load(of + k, values);
+    numeric::four(to + k) += factor * values;
   }
   for (; k < count; ++k)
     to[k] += factor * static_cast<double>(of[k]);
 }
 
 } // namespace
-} // namespace gewebe
+} // namespace gewebe::integrator

@@ -7,7 +7,7 @@
 #include <cstddef>
 #include <cstdint>
 
-namespace gewebe {
+namespace gewebe::integrator {
 
 /// Springs by columns, as many as whole batches have: those that fill the last one up are of no
 /// stiffness and join node 0 to itself.
@@ -42,4 +42,4 @@ inline const MotionKernel& motion_kernel(CpuLevel level) {
   return level == CpuLevel::baseline ? motion_kernel_baseline : motion_kernel_avx2;
 }
 
-} // namespace gewebe
+} // namespace gewebe::integrator

@@ -10,7 +10,7 @@
 #include <cmath>
 #include <utility>
 
-namespace gewebe {
+namespace gewebe::integrator {
 
 namespace {
 
@@ -29,11 +29,12 @@ void rigid_parts(const MotionBody& body, const MotionState& state, Numbers& movi
   }
   centre /= mass;
   mean /= mass;
-  Matrix3 inertia = Matrix3::Zero();
+  fem::Matrix3 inertia = fem::Matrix3::Zero();
   for (std::size_t i = 0; i < body.masses.size(); ++i) {
     const Eigen::Vector3d arm = at(state.place, i) - centre;
     moment += body.masses[i] * arm.cross(at(state.velocity, i) - mean);
-    inertia += body.masses[i] * (arm.squaredNorm() * Matrix3::Identity() - arm * arm.transpose());
+    inertia +=
+        body.masses[i] * (arm.squaredNorm() * fem::Matrix3::Identity() - arm * arm.transpose());
   }
   const Eigen::Vector3d spin = inertia.ldlt().solve(moment);
   for (std::size_t i = 0; i < body.masses.size(); ++i) {
@@ -79,4 +80,4 @@ bool limit_energy(const MotionBody& body, MotionState& state, double elastic, do
   return true;
 }
 
-} // namespace gewebe
+} // namespace gewebe::integrator

@@ -3,7 +3,7 @@
 
 #include "integrator/motion_body_internal.h"
 
-namespace gewebe {
+namespace gewebe::integrator {
 
 /// Lowers speeds such that energy (of motion, `elastic`, and of the load) is `before` at most,
 /// `rounding` left aside; those of held axes stay. Lowers first what neither moves nor turns the
@@ -12,4 +12,4 @@ namespace gewebe {
 bool limit_energy(const MotionBody& body, MotionState& state, double elastic, double before,
                   double rounding);
 
-} // namespace gewebe
+} // namespace gewebe::integrator

@@ -15,7 +15,7 @@
 #include <utility>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::integrator {
 
 namespace {
 
@@ -33,11 +33,11 @@ constexpr double least_displacement = 1e-9;
 /// A point, or a step between two.
 struct Mixed {
   Numbers at;
-  MixedUnknowns own;
+  fem::MixedUnknowns own;
 };
 
 void add(Mixed& to, double factor, const Mixed& of) {
-  gewebe::add(to.at, factor, of.at);
+  gewebe::integrator::add(to.at, factor, of.at);
   for (std::size_t t = 0; t < to.own.bubble.size(); ++t) {
     to.own.bubble[t] += factor * of.own.bubble[t];
     for (std::size_t p = 0; p < 4; ++p)
@@ -62,7 +62,7 @@ void add_following(std::span<const FollowingForce> following, std::span<const do
 }
 
 /// Adds to the entry of two axes of a symmetric matrix, if both are free.
-void add_entry(StiffnessMatrix& matrix, std::size_t axis, std::size_t other, double value) {
+void add_entry(linalg::StiffnessMatrix& matrix, std::size_t axis, std::size_t other, double value) {
   const std::int64_t i = matrix.row_of_axis[axis], j = matrix.row_of_axis[other];
   if (i < 0 || j < 0)
     return;
@@ -78,7 +78,7 @@ void add_entry(StiffnessMatrix& matrix, std::size_t axis, std::size_t other, dou
 /// pressure on a closed surface, or one with a held border, the rest is small: it comes from the
 /// corners of quadratic faces alone, whose forces act on the middles.
 void take_following(std::span<const FollowingForce> following, std::span<const double> at,
-                    StiffnessMatrix& matrix) {
+                    linalg::StiffnessMatrix& matrix) {
   for (const FollowingForce& f : following)
     for (std::size_t k = 0; k < 3; ++k) {
       // By the corner k the force changes by the opposite side times its displacement.
@@ -177,7 +177,7 @@ public:
 private:
   Numbers displacement(const Numbers& at) const {
     Numbers u = at;
-    gewebe::add(u, -1, objective_.body().rest);
+    gewebe::integrator::add(u, -1, objective_.body().rest);
     return u;
   }
   bool moves_held(const Numbers& at) const {
@@ -195,12 +195,12 @@ private:
       value_ = solid_.linearise(u, x.own, positive, context_);
       ++step_.factorisations;
       try {
-        StiffnessMatrix matrix = solid_.matrix(objective_.state().held, context_);
+        linalg::StiffnessMatrix matrix = solid_.matrix(objective_.state().held, context_);
         take_following(following_, x.at, matrix);
         tangent_.make(std::move(matrix), context_);
         share_ = k;
         return;
-      } catch (const NotPositiveDefinite&) {
+      } catch (const linalg::NotPositiveDefinite&) {
         if (positive == 1)
           throw;
       }
@@ -232,7 +232,7 @@ private:
       quick_.solve_at_rest(by.at);
     slope_ = product(forces, by.at);
     if (moves)
-      gewebe::add(by.at, 1, way);
+      gewebe::integrator::add(by.at, 1, way);
     by.own = solid_.follow(by.at, context_);
     return by;
   }
@@ -244,7 +244,7 @@ private:
   MotionTangent& tangent_;
   SolidStep& step_;
   const Context& context_;
-  MixedSolid solid_;
+  fem::MixedSolid solid_;
   bool exact_ = false;
   Numbers forces_;
   std::size_t share_ = 0;       ///< of positive_shares, in the last matrix
@@ -313,8 +313,9 @@ bool finish(RestNewton& newton, Mixed& x, Mixed& by, double before, double worth
       return true;
     }
     const double rate = now / before;
-    if (!(rate < 1) ||
-        natural_logarithm(options.tolerance / step.left) / natural_logarithm(rate) > worth)
+    if (!(rate < 1) || numeric::natural_logarithm(options.tolerance / step.left) /
+                               numeric::natural_logarithm(rate) >
+                           worth)
       return false;
     Mixed next = acceleration.next(x, by);
     newton.reach_target(next.at);
@@ -354,7 +355,7 @@ void newton_to_rest(const MotionObjective& objective, MotionPoint& now, const Nu
     Mixed by;
     try {
       by = newton.linearise(x);
-    } catch (const NotPositiveDefinite&) {
+    } catch (const linalg::NotPositiveDefinite&) {
       break; // what is torn far apart has no matrix in numbers of this length
     }
     const double whole = length(by);
@@ -372,4 +373,4 @@ void newton_to_rest(const MotionObjective& objective, MotionPoint& now, const Nu
   exact = newton.exact();
 }
 
-} // namespace gewebe
+} // namespace gewebe::integrator

@@ -9,7 +9,7 @@
 #include <span>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::integrator {
 
 using Numbers = std::vector<double>;
 
@@ -53,4 +53,4 @@ std::array<double, Width> sums_of_axes(const Context& context, std::size_t axes,
   return sums;
 }
 
-} // namespace gewebe
+} // namespace gewebe::integrator

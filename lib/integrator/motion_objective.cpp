@@ -10,7 +10,7 @@
 #include <array>
 #include <cmath>
 
-namespace gewebe {
+namespace gewebe::integrator {
 
 MotionObjective::MotionObjective(const MotionBody& body, const MotionState& state,
                                  SolidEnergy& energy, double h, const SolidMotionOptions& options)
@@ -161,4 +161,4 @@ void MotionObjective::keep_both_momenta(MotionPoint& point) const {
   move(point, balance(point.at, {}));
 }
 
-} // namespace gewebe
+} // namespace gewebe::integrator

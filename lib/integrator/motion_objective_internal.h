@@ -9,7 +9,7 @@
 #include <cmath>
 #include <span>
 
-namespace gewebe {
+namespace gewebe::integrator {
 
 /// A place with what is known of it.
 struct MotionPoint {
@@ -68,4 +68,4 @@ private:
   mutable int evaluations_ = 0;
 };
 
-} // namespace gewebe
+} // namespace gewebe::integrator

@@ -8,7 +8,7 @@
 #include <cmath>
 #include <utility>
 
-namespace gewebe {
+namespace gewebe::integrator {
 
 namespace {
 
@@ -21,8 +21,8 @@ bool held_by_nodes(const std::vector<std::uint8_t>& held) {
 }
 
 /// Zeros on the diagonal of the free nodes' first axes.
-StiffnessMatrix no_stiffness(const std::vector<std::uint8_t>& held) {
-  StiffnessMatrix matrix;
+linalg::StiffnessMatrix no_stiffness(const std::vector<std::uint8_t>& held) {
+  linalg::StiffnessMatrix matrix;
   matrix.row_of_axis.assign(held.size(), -1);
   matrix.column_start.push_back(0);
   for (std::size_t axis = 0; axis < held.size(); axis += 3) {
@@ -40,7 +40,7 @@ StiffnessMatrix no_stiffness(const std::vector<std::uint8_t>& held) {
 
 } // namespace
 
-void add_masses(const MotionBody& body, double h, StiffnessMatrix& matrix) {
+void add_masses(const MotionBody& body, double h, linalg::StiffnessMatrix& matrix) {
   for (std::size_t c = 0; c < matrix.order(); ++c) {
     const std::size_t node = static_cast<std::size_t>(matrix.axis_of_row[c]) / 3;
     matrix.value[static_cast<std::size_t>(matrix.column_start[c])] +=
@@ -59,10 +59,10 @@ int MotionQuick::prepare(const MotionBody& body, const MotionSprings& springs,
     // Springs are bounded along every axis alike: of a net alone one matrix serves all three.
     alike_ = body.mesh.tetrahedra.empty() && held_by_nodes(held);
     stiffness_ =
-        alike_ ? no_stiffness(held) : solid_stiffness(body.mesh, body.elements, held, context);
+        alike_ ? no_stiffness(held) : fem::solid_stiffness(body.mesh, body.elements, held, context);
   }
   stiffness_is_bound_ = body.mesh.tetrahedra.empty() && !springs.empty();
-  StiffnessMatrix a = stiffness_;
+  linalg::StiffnessMatrix a = stiffness_;
   for (double& value : a.value)
     value *= scale;
   if (!springs.empty())
@@ -91,12 +91,12 @@ int MotionQuick::prepare(const MotionBody& body, const MotionSprings& springs,
 void MotionQuick::take_tangent(const MotionBody& body, const MotionSprings& springs,
                                const Numbers& at, const Context& context) {
   if (!(tangent_.factor && tangent_.held == *held_))
-    tangent_.axes = solid_stiffness(body.mesh, body.elements, *held_, context);
-  StiffnessMatrix a = springs.with_tangent(tangent_.axes, at, 1 / step_);
+    tangent_.axes = fem::solid_stiffness(body.mesh, body.elements, *held_, context);
+  linalg::StiffnessMatrix a = springs.with_tangent(tangent_.axes, at, 1 / step_);
   add_masses(body, step_, a);
   drop_tangent();
   tangent_.version = 0; // should it fail
-  tangent_.matrix = std::make_shared<const StiffnessMatrix>(std::move(a));
+  tangent_.matrix = std::make_shared<const linalg::StiffnessMatrix>(std::move(a));
   factorise_tangent(context);
   tangent_.taken = true;
   tangent_.version = version_ = unique_number();
@@ -130,7 +130,7 @@ void MotionQuick::restore(const Past& past, const MotionBody& body, const Motion
     step_ = 0;
   if (past.tangent) {
     if (!(tangent_.factor && tangent_.held == *held_))
-      tangent_.axes = solid_stiffness(body.mesh, body.elements, *held_, context);
+      tangent_.axes = fem::solid_stiffness(body.mesh, body.elements, *held_, context);
     const bool same = past.tangent_version == tangent_.version && tangent_.held == *held_;
     tangent_.version = 0; // should it fail
     tangent_.matrix = past.tangent;
@@ -183,7 +183,7 @@ double MotionQuick::rounds_of_tangent(const MotionBody& body) const {
 
 void MotionQuick::solve_at_rest(Numbers& v) const {
   const Numbers f = v;
-  solve_axes(stiffness_, *factor_, f, v);
+  linalg::solve_axes(stiffness_, *factor_, f, v);
 }
 
 double MotionQuick::condition() const {
@@ -200,7 +200,7 @@ double MotionQuick::condition() const {
   double norm = 0;
   for (const double sum : sums)
     norm = std::max(norm, sum);
-  return norm * inverse_norm(*factor_);
+  return norm * linalg::inverse_norm(*factor_);
 }
 
 void MotionQuick::forget() {
@@ -247,17 +247,17 @@ void MotionQuick::unit_responses(std::span<const std::size_t> axes,
                                  std::span<double> columns) const {
   const std::size_t size = held_->size();
   if (tangent_.taken) {
-    solve_unit_axes(tangent_.axes, *tangent_.factor, axes, columns);
+    linalg::solve_unit_axes(tangent_.axes, *tangent_.factor, axes, columns);
   } else if (alike_) {
     std::vector<std::size_t> first(axes.begin(), axes.end()); // of their nodes
     for (std::size_t& axis : first)
       axis -= axis % 3;
-    solve_unit_axes(stiffness_, *factor_, first, columns);
+    linalg::solve_unit_axes(stiffness_, *factor_, first, columns);
     for (std::size_t c = 0; c < axes.size(); ++c)
       for (std::size_t axis = 0; axis < size && axes[c] % 3 != 0; axis += 3)
         std::swap(columns[c * size + axis], columns[c * size + axis + axes[c] % 3]);
   } else {
-    solve_unit_axes(stiffness_, *factor_, axes, columns);
+    linalg::solve_unit_axes(stiffness_, *factor_, axes, columns);
   }
   if (filled_ == nullptr)
     return;
@@ -277,8 +277,8 @@ void MotionQuick::solve(Numbers& v, const Context& context) {
 }
 
 void MotionQuick::solve_constant(Numbers& v, const Context& context) {
-  const StiffnessMatrix& axes = tangent_.taken ? tangent_.axes : stiffness_;
-  SingleFactor& factor = tangent_.taken ? *tangent_.single : *single_;
+  const linalg::StiffnessMatrix& axes = tangent_.taken ? tangent_.axes : stiffness_;
+  linalg::SingleFactor& factor = tangent_.taken ? *tangent_.single : *single_;
   const std::size_t alike = alike_ && !tangent_.taken ? 3 : 1;
   double scale = 0; // whatever the numbers are, single precision holds them
   for (const std::int64_t at : axes.axis_of_row)
@@ -299,4 +299,4 @@ void MotionQuick::solve_constant(Numbers& v, const Context& context) {
   v.swap(solved_);
 }
 
-} // namespace gewebe
+} // namespace gewebe::integrator

@@ -18,7 +18,7 @@
 #include <span>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::integrator {
 
 /// What rounds write to, kept for its memory.
 struct MotionScratch {
@@ -34,7 +34,8 @@ public:
   struct Past {
     double step = 0; ///< of the matrix; 0: there is none
     CopyOnWrite<std::vector<std::uint8_t>> held{};
-    std::shared_ptr<const StiffnessMatrix> tangent{}; ///< of springs, in place of their bound
+    std::shared_ptr<const linalg::StiffnessMatrix>
+        tangent{}; ///< of springs, in place of their bound
     std::uint64_t tangent_version = 0;
     Secants secants{};
     double rate = 1;
@@ -97,18 +98,18 @@ private:
   bool all_still_ = false;
   bool stiffness_is_bound_ = false; ///< there are springs and no elements
   bool alike_ = false;              ///< the matrix is of nodes, and serves each axis
-  StiffnessMatrix stiffness_;
-  std::optional<Factor> factor_;
-  std::optional<SingleFactor> single_;
+  linalg::StiffnessMatrix stiffness_;
+  std::optional<linalg::Factor> factor_;
+  std::optional<linalg::SingleFactor> single_;
   /// The tangent's, of all axes, in place of these.
   struct Tangent {
     bool taken = false;
     std::vector<std::uint8_t> held;
-    StiffnessMatrix axes;
-    std::shared_ptr<const StiffnessMatrix> matrix; ///< of the factor
+    linalg::StiffnessMatrix axes;
+    std::shared_ptr<const linalg::StiffnessMatrix> matrix; ///< of the factor
     std::uint64_t version = 0;
-    std::optional<Factor> factor;
-    std::optional<SingleFactor> single;
+    std::optional<linalg::Factor> factor;
+    std::optional<linalg::SingleFactor> single;
   } tangent_;
   void factorise_tangent(const Context& context);
   void solve_constant(Numbers& v, const Context& context);
@@ -121,6 +122,6 @@ private:
 };
 
 /// Adds the masses times their inertia in a step of h to the diagonal.
-void add_masses(const MotionBody& body, double h, StiffnessMatrix& matrix);
+void add_masses(const MotionBody& body, double h, linalg::StiffnessMatrix& matrix);
 
-} // namespace gewebe
+} // namespace gewebe::integrator

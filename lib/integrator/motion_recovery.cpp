@@ -10,7 +10,7 @@
 #include <cstddef>
 #include <utility>
 
-namespace gewebe {
+namespace gewebe::integrator {
 
 namespace {
 
@@ -25,8 +25,9 @@ constexpr int still_steps = 3;
 
 bool is_inside_out(const MotionBody& body, const Numbers& places, std::size_t t) {
   const Tetrahedron& corner = body.mesh.tetrahedra[t];
-  return !(tetrahedron_volume(vector_at(places, corner[0]), vector_at(places, corner[1]),
-                              vector_at(places, corner[2]), vector_at(places, corner[3])) > 0);
+  return !(tetrahedra::tetrahedron_volume(
+               vector_at(places, corner[0]), vector_at(places, corner[1]),
+               vector_at(places, corner[2]), vector_at(places, corner[3])) > 0);
 }
 
 /// Volume at rest of what is inside out; flat is, and so are places that aren't finite.
@@ -39,29 +40,30 @@ double inside_out(const MotionBody& body, const Numbers& places) {
 
 /// By tetrahedron: whether it is right side out and shares a node with one that isn't.
 std::vector<std::uint8_t> around_inside_out(const MotionBody& body, const Numbers& places) {
-  const std::size_t count = body.mesh.tetrahedra.size(), of_element = solid_nodes(body.mesh);
+  const std::size_t count = body.mesh.tetrahedra.size(), of_element = fem::solid_nodes(body.mesh);
   std::vector<std::uint8_t> inside_out(count), touched(body.nodes()), around(count);
   for (std::size_t t = 0; t < count; ++t) {
     inside_out[t] = is_inside_out(body, places, t) ? 1 : 0;
     for (std::size_t a = 0; inside_out[t] != 0 && a < of_element; ++a)
-      touched[solid_node(body.mesh, t, a)] = 1;
+      touched[fem::solid_node(body.mesh, t, a)] = 1;
   }
   for (std::size_t t = 0; t < count; ++t)
     for (std::size_t a = 0; inside_out[t] == 0 && a < of_element; ++a)
-      if (touched[solid_node(body.mesh, t, a)] != 0)
+      if (touched[fem::solid_node(body.mesh, t, a)] != 0)
         around[t] = 1;
   return around;
 }
 
 } // namespace
 
-MotionRecovery::MotionRecovery(const MotionBody& body, std::span<const SolidMaterial> materials,
-                               const SolidNet& net, const SolidMotionOptions& options) {
+MotionRecovery::MotionRecovery(const MotionBody& body,
+                               std::span<const fem::SolidMaterial> materials, const SolidNet& net,
+                               const SolidMotionOptions& options) {
   if (!options.recover || options.reference || !net.springs.empty() || net.bulk > 0 ||
       body.elements.empty())
     return;
   for (const double stiffness : {1.0, looseness})
-    for (SolidMaterial m : materials) {
+    for (fem::SolidMaterial m : materials) {
       m.young *= stiffness / (1 + m.poisson);
       m.poisson = 0;
       m.law = {};
@@ -69,7 +71,7 @@ MotionRecovery::MotionRecovery(const MotionBody& body, std::span<const SolidMate
       materials_.push_back(m);
     }
   double volume = 0, shear = 0, mass = 0;
-  for (const SolidElement& e : body.elements) {
+  for (const fem::SolidElement& e : body.elements) {
     volume += e.volume;
     shear += e.material.mu * e.volume;
   }
@@ -80,7 +82,7 @@ MotionRecovery::MotionRecovery(const MotionBody& body, std::span<const SolidMate
 }
 
 SolidMotion MotionRecovery::make(const MotionBody& body, const MotionState& state,
-                                 const TetMesh& mesh, SolidLaw law,
+                                 const tetrahedra::TetMesh& mesh, SolidLaw law,
                                  const SolidMotionOptions& options, const Context& context) const {
   SolidMotionOptions soft = options;
   soft.law = law;
@@ -102,7 +104,7 @@ void MotionRecovery::look(const MotionBody& body, const MotionState& state, doub
   if (materials_.empty() || !(elastic > worth_looking_))
     return;
   double volume = 0;
-  for (const SolidElement& e : body.elements)
+  for (const fem::SolidElement& e : body.elements)
     volume += e.volume;
   if (!(inside_out(body, state.place) > scrambled_part * volume))
     return;
@@ -126,9 +128,9 @@ void MotionRecovery::begin(SolidMotion&& soft, SolidLaw law) {
 }
 
 /// The mesh with the material of loose elements.
-TetMesh MotionRecovery::loosened(const MotionBody& body,
-                                 const std::vector<std::uint8_t>& loose) const {
-  TetMesh mesh = body.mesh;
+tetrahedra::TetMesh MotionRecovery::loosened(const MotionBody& body,
+                                             const std::vector<std::uint8_t>& loose) const {
+  tetrahedra::TetMesh mesh = body.mesh;
   if (loose.empty())
     return mesh;
   mesh.material.resize(loose.size());
@@ -193,7 +195,7 @@ void MotionRecovery::loosen(const MotionBody& body, const MotionState& state, do
   std::vector<std::uint8_t> loose = around_inside_out(body, state.place);
   if (loose == loose_)
     return;
-  const TetMesh mesh = loosened(body, loose);
+  const tetrahedra::TetMesh mesh = loosened(body, loose);
   for (const SolidLaw law : {SolidLaw::corotational, SolidLaw::hyperelastic}) {
     if (law == SolidLaw::corotational && !mesh.middles.empty())
       continue;
@@ -212,4 +214,4 @@ bool MotionRecovery::is_right(const MotionBody& body, const Numbers& places) {
   return inside_out(body, places) == 0;
 }
 
-} // namespace gewebe
+} // namespace gewebe::integrator

@@ -28,7 +28,7 @@
 #include <span>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::integrator {
 
 class MotionRecovery {
 public:
@@ -48,7 +48,7 @@ public:
                const SolidMotionOptions& options, const Context& context);
 
   /// There is none of what Newton's method moves, and of what has springs or encloses something.
-  MotionRecovery(const MotionBody& body, std::span<const SolidMaterial> materials,
+  MotionRecovery(const MotionBody& body, std::span<const fem::SolidMaterial> materials,
                  const SolidNet& net, const SolidMotionOptions& options);
 
   bool on() const noexcept { return soft_.has_value(); }
@@ -65,16 +65,18 @@ public:
   void end() { soft_.reset(); }
 
 private:
-  SolidMotion make(const MotionBody& body, const MotionState& state, const TetMesh& mesh,
-                   SolidLaw law, const SolidMotionOptions& options, const Context& context) const;
+  SolidMotion make(const MotionBody& body, const MotionState& state,
+                   const tetrahedra::TetMesh& mesh, SolidLaw law, const SolidMotionOptions& options,
+                   const Context& context) const;
   void loosen(const MotionBody& body, const MotionState& state, double elastic,
               const SolidMotionOptions& options, const Context& context);
   bool stands(double elastic, double h);
-  TetMesh loosened(const MotionBody& body, const std::vector<std::uint8_t>& loose) const;
+  tetrahedra::TetMesh loosened(const MotionBody& body,
+                               const std::vector<std::uint8_t>& loose) const;
   void begin(SolidMotion&& soft, SolidLaw law);
 
   /// Those of the mesh, then as many for what is loosened; empty: there is no recovery.
-  std::vector<SolidMaterial> materials_;
+  std::vector<fem::SolidMaterial> materials_;
   double worth_looking_ = 0; ///< energy
   std::optional<SolidMotion> soft_;
   std::uint64_t number_ = 0; ///< of soft_, see base/unique_number.h
@@ -88,4 +90,4 @@ private:
   int steps_standing_ = 0;
 };
 
-} // namespace gewebe
+} // namespace gewebe::integrator

@@ -11,7 +11,7 @@
 #include <cstdint>
 #include <functional>
 
-namespace gewebe {
+namespace gewebe::integrator {
 
 namespace {
 
@@ -24,8 +24,9 @@ struct Entry {
 };
 
 /// The matrix of springs on the free axes of another one, added to that.
-StiffnessMatrix with_blocks(const StiffnessMatrix& of_elements,
-                            std::span<const SolidSpring> springs, const BlockOfSpring& block_of) {
+linalg::StiffnessMatrix with_blocks(const linalg::StiffnessMatrix& of_elements,
+                                    std::span<const SolidSpring> springs,
+                                    const BlockOfSpring& block_of) {
   std::vector<Entry> entries;
   for (std::size_t k = 0; k < springs.size(); ++k) {
     const std::array<double, 9> block = block_of(k);
@@ -44,7 +45,7 @@ StiffnessMatrix with_blocks(const StiffnessMatrix& of_elements,
   std::ranges::stable_sort(entries, [](const Entry& a, const Entry& b) {
     return a.column < b.column || (a.column == b.column && a.row < b.row);
   });
-  StiffnessMatrix matrix;
+  linalg::StiffnessMatrix matrix;
   matrix.row_of_axis = of_elements.row_of_axis;
   matrix.axis_of_row = of_elements.axis_of_row;
   matrix.column_start.push_back(0);
@@ -61,7 +62,7 @@ StiffnessMatrix with_blocks(const StiffnessMatrix& of_elements,
       }
     matrix.column_start.push_back(static_cast<std::int64_t>(matrix.row.size()));
   }
-  return sum(of_elements, matrix);
+  return fem::sum(of_elements, matrix);
 }
 
 } // namespace
@@ -94,16 +95,16 @@ double MotionSprings::evaluate(const Numbers& at, double per_time, std::span<dou
   return energies.elastic + energies.damped;
 }
 
-StiffnessMatrix MotionSprings::with_bound(const StiffnessMatrix& of_elements,
-                                          double per_time) const {
+linalg::StiffnessMatrix MotionSprings::with_bound(const linalg::StiffnessMatrix& of_elements,
+                                                  double per_time) const {
   return with_blocks(of_elements, springs_, [&](std::size_t k) {
     const double all = springs_[k].stiffness + springs_[k].damping * per_time;
     return std::array<double, 9>{all, 0, 0, 0, all, 0, 0, 0, all};
   });
 }
 
-StiffnessMatrix MotionSprings::with_tangent(const StiffnessMatrix& of_elements, const Numbers& at,
-                                            double per_time) const {
+linalg::StiffnessMatrix MotionSprings::with_tangent(const linalg::StiffnessMatrix& of_elements,
+                                                    const Numbers& at, double per_time) const {
   return with_blocks(of_elements, springs_, [&](std::size_t k) {
     const SolidSpring& s = springs_[k];
     const Vec3 d = vector_at(at, s.j) - vector_at(at, s.i);
@@ -121,4 +122,4 @@ StiffnessMatrix MotionSprings::with_tangent(const StiffnessMatrix& of_elements, 
   });
 }
 
-} // namespace gewebe
+} // namespace gewebe::integrator

@@ -16,7 +16,7 @@
 #include <utility>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::integrator {
 
 class MotionSprings {
 public:
@@ -36,10 +36,11 @@ public:
 
   /// A matrix plus that of the springs with all they have along every axis, whatever their
   /// direction: it bounds their tangent wherever they turn to.
-  StiffnessMatrix with_bound(const StiffnessMatrix& of_elements, double per_time) const;
+  linalg::StiffnessMatrix with_bound(const linalg::StiffnessMatrix& of_elements,
+                                     double per_time) const;
   /// The same with their tangent at these places, where positive.
-  StiffnessMatrix with_tangent(const StiffnessMatrix& of_elements, const Numbers& at,
-                               double per_time) const;
+  linalg::StiffnessMatrix with_tangent(const linalg::StiffnessMatrix& of_elements,
+                                       const Numbers& at, double per_time) const;
 
 private:
   std::vector<SolidSpring> springs_;
@@ -49,4 +50,4 @@ private:
   double elastic_ = 0;
 };
 
-} // namespace gewebe
+} // namespace gewebe::integrator

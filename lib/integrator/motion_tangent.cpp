@@ -17,7 +17,7 @@
 #include <span>
 #include <utility>
 
-namespace gewebe {
+namespace gewebe::integrator {
 
 namespace {
 
@@ -27,13 +27,14 @@ constexpr std::size_t worth_linear = 128, worth_quadratic = 32;
 /// What the turning of the frame adds to the tangent of a corotational element: the energy aᵀ m a
 /// of a = Rᵀ curl of the displacement, over twice the volume. Exact for linear elements without
 /// damping. \param positive  only where it is positive
-Matrix3 turning(const SolidElement& element, const ElementFrame& frame, bool positive) {
+fem::Matrix3 turning(const fem::SolidElement& element, const fem::ElementFrame& frame,
+                     bool positive) {
   const auto [lambda, mu] = element.material;
-  const SymmetricBlock& s = frame.stretch;
+  const linalg::SymmetricBlock& s = frame.stretch;
   const double trace = s[0] + s[3] + s[5];
-  Matrix3 g;
+  fem::Matrix3 g;
   g << trace - s[0], -s[1], -s[2], -s[1], trace - s[3], -s[4], -s[2], -s[4], trace - s[5];
-  const Eigen::SelfAdjointEigenSolver<Matrix3> solver(g);
+  const Eigen::SelfAdjointEigenSolver<fem::Matrix3> solver(g);
   Eigen::Vector3d value;
   for (int k = 0; k < 3; ++k) {
     const double pair = solver.eigenvalues()[k];
@@ -43,19 +44,19 @@ Matrix3 turning(const SolidElement& element, const ElementFrame& frame, bool pos
   return solver.eigenvectors() * value.asDiagonal() * solver.eigenvectors().transpose();
 }
 
-Matrix3 cross_matrix(const Vec3& v) {
-  Matrix3 m;
+fem::Matrix3 cross_matrix(const Vec3& v) {
+  fem::Matrix3 m;
   m << 0, -v.z, v.y, v.z, 0, -v.x, -v.y, v.x, 0;
   return m;
 }
 
 /// Gradient of a node's shape function in the middle of the element.
-Vec3 middle_gradient(const SolidElement& e, std::size_t a, bool quadratic) {
+Vec3 middle_gradient(const fem::SolidElement& e, std::size_t a, bool quadratic) {
   if (!quadratic)
     return e.gradient[a];
   if (a < 4)
     return {};
-  const auto [i, j] = tetrahedron_edges[a - 4];
+  const auto [i, j] = tetrahedra::tetrahedron_edges[a - 4];
   return e.gradient[i] + e.gradient[j];
 }
 
@@ -64,17 +65,18 @@ Vec3 middle_gradient(const SolidElement& e, std::size_t a, bool quadratic) {
 std::vector<Numbers> hyperelastic_tangents(const MotionBody& body, const SolidEnergy& energy,
                                            const Numbers& at, bool positive,
                                            const Context& context) {
-  const std::size_t count = solid_nodes(body.mesh);
+  const std::size_t count = fem::solid_nodes(body.mesh);
   const auto order = static_cast<Eigen::Index>(3 * count);
   std::vector<Numbers> of_element(body.elements.size());
   const bool worth = body.elements.size() >= (count == 10 ? worth_quadratic : worth_linear);
   const auto respond = [&](std::size_t begin, std::size_t end) {
-    HyperelasticResponse response;
+    fem::HyperelasticResponse response;
     for (std::size_t t = begin; t < end; ++t) {
       const std::array<Vec3, 10> u = energy.displacements(at, t);
-      hyperelastic_response(
-          body.elements[t], std::span(u).first(count), energy.bubble(t),
-          positive ? HyperelasticPart::positive_tangent : HyperelasticPart::tangent, response);
+      fem::hyperelastic_response(body.elements[t], std::span(u).first(count), energy.bubble(t),
+                                 positive ? fem::HyperelasticPart::positive_tangent
+                                          : fem::HyperelasticPart::tangent,
+                                 response);
       const Eigen::Map<const Eigen::Matrix<double, 33, 33, Eigen::RowMajor>> k(
           response.tangent.data());
       of_element[t].resize(9 * count * count);
@@ -101,7 +103,7 @@ void MotionTangent::make(const MotionObjective& objective, const Numbers& at,
     try {
       make(objective, at, false, context);
       return;
-    } catch (const NotPositiveDefinite&) {
+    } catch (const linalg::NotPositiveDefinite&) {
       // The shape here isn't stable.
     }
   }
@@ -112,46 +114,50 @@ void MotionTangent::make(const MotionObjective& objective, const Numbers& at, bo
                          const Context& context) {
   const MotionBody& body = objective.body();
   const SolidEnergy& energy = objective.energy();
-  const std::size_t count = solid_nodes(body.mesh);
+  const std::size_t count = fem::solid_nodes(body.mesh);
   const bool corotational = energy.law() == SolidLaw::corotational;
   std::vector<Numbers> of_element;
   if (!corotational)
     of_element = hyperelastic_tangents(body, energy, at, positive, context);
   const double scale = (corotational ? 1 : 0) + objective.damping();
-  std::vector<Matrix3> turns(body.elements.size()), frames(body.elements.size());
+  std::vector<fem::Matrix3> turns(body.elements.size()), frames(body.elements.size());
   for (std::size_t t = 0; t < body.elements.size(); ++t) {
-    const ElementFrame frame = energy.frame(t);
-    frames[t] = matrix(frame.rotation);
-    turns[t] = corotational ? turning(body.elements[t], frame, positive) : Matrix3(Matrix3::Zero());
+    const fem::ElementFrame frame = energy.frame(t);
+    frames[t] = fem::matrix(frame.rotation);
+    turns[t] = corotational ? turning(body.elements[t], frame, positive)
+                            : fem::Matrix3(fem::Matrix3::Zero());
   }
   const auto block_of = [&](std::size_t t, std::size_t a, std::size_t b) {
-    SolidBlock block{};
+    fem::SolidBlock block{};
     if (!corotational)
       for (std::size_t n = 0; n < 9; ++n)
         block[n] = of_element[t][3 * count * (3 * a + n / 3) + 3 * b + n % 3];
     if (scale == 0)
       return block;
-    const SolidElement& e = body.elements[t];
-    const SolidBlock small = count == 4 ? linear_block(e, a, b) : quadratic_block(e, a, b);
-    const Matrix3 ga = cross_matrix(middle_gradient(e, a, count == 10)),
-                  gb = cross_matrix(middle_gradient(e, b, count == 10));
-    const Matrix3 local = scale * matrix(small) + e.volume * ga.transpose() * turns[t] * gb;
-    const Matrix3 turned = frames[t] * local * frames[t].transpose();
+    const fem::SolidElement& e = body.elements[t];
+    const fem::SolidBlock small =
+        count == 4 ? fem::linear_block(e, a, b) : fem::quadratic_block(e, a, b);
+    const fem::Matrix3 ga = cross_matrix(middle_gradient(e, a, count == 10)),
+                       gb = cross_matrix(middle_gradient(e, b, count == 10));
+    const fem::Matrix3 local =
+        scale * fem::matrix(small) + e.volume * ga.transpose() * turns[t] * gb;
+    const fem::Matrix3 turned = frames[t] * local * frames[t].transpose();
     for (std::size_t n = 0; n < 9; ++n)
       block[n] =
           turned(static_cast<Eigen::Index>(n / 3), static_cast<Eigen::Index>(n % 3)) + block[n];
     return block;
   };
-  StiffnessMatrix matrix = assembled_matrix(body.mesh, block_of, objective.state().held, context);
+  linalg::StiffnessMatrix matrix =
+      fem::assembled_matrix(body.mesh, block_of, objective.state().held, context);
   if (!energy.springs().empty())
     matrix = energy.springs().with_tangent(matrix, at, 1 / objective.step());
   add_masses(body, objective.step(), matrix);
   make(std::move(matrix), context);
 }
 
-void MotionTangent::make(StiffnessMatrix matrix, const Context& context) {
+void MotionTangent::make(linalg::StiffnessMatrix matrix, const Context& context) {
   made_ = false;
-  tangent_ = std::make_shared<const StiffnessMatrix>(std::move(matrix));
+  tangent_ = std::make_shared<const linalg::StiffnessMatrix>(std::move(matrix));
   factorise(context);
   made_ = true;
   version_ = unique_number();
@@ -179,12 +185,12 @@ void MotionTangent::restore(const Past& past, const Context& context) {
 
 void MotionTangent::unit_responses(std::span<const std::size_t> axes,
                                    std::span<double> columns) const {
-  solve_unit_axes(*tangent_, *factor_, axes, columns);
+  linalg::solve_unit_axes(*tangent_, *factor_, axes, columns);
 }
 
 void MotionTangent::solve(Numbers& v) const {
   const Numbers f = v;
-  solve_axes(*tangent_, *factor_, f, v);
+  linalg::solve_axes(*tangent_, *factor_, f, v);
 }
 
-} // namespace gewebe
+} // namespace gewebe::integrator

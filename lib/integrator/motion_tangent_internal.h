@@ -13,13 +13,13 @@
 #include <span>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::integrator {
 
 class MotionTangent {
 public:
   /// The matrix without its factor, which is made again where it is another one's. Copies share it.
   struct Past {
-    std::shared_ptr<const StiffnessMatrix> matrix;
+    std::shared_ptr<const linalg::StiffnessMatrix> matrix;
     std::uint64_t version = 0;
     bool made = false;
   };
@@ -36,7 +36,7 @@ public:
   /// it is positive definite, else of its positive parts. \throw as Factor: then it isn't made
   void make(const MotionObjective& objective, const Numbers& at, const Context& context);
   /// Of a matrix made elsewhere. \throw as Factor: then it isn't made
-  void make(StiffnessMatrix matrix, const Context& context);
+  void make(linalg::StiffnessMatrix matrix, const Context& context);
   /// Responses to unit forces along axes, columns of all axes. \pre made
   void unit_responses(std::span<const std::size_t> axes, std::span<double> columns) const;
   /// In place. \pre made
@@ -50,8 +50,8 @@ private:
   std::uint64_t version_ = 0;
   void factorise(const Context& context);
 
-  std::shared_ptr<const StiffnessMatrix> tangent_;
-  std::optional<Factor> factor_;
+  std::shared_ptr<const linalg::StiffnessMatrix> tangent_;
+  std::optional<linalg::Factor> factor_;
 };
 
-} // namespace gewebe
+} // namespace gewebe::integrator

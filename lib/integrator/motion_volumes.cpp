@@ -11,7 +11,7 @@
 #include <cstdint>
 #include <map>
 
-namespace gewebe {
+namespace gewebe::integrator {
 
 namespace {
 
@@ -22,7 +22,7 @@ constexpr double no_volume = 1e-9; ///< of the cube of the extent
 MotionVolumes::MotionVolumes(std::span<const Triangle> triangles, const Numbers& rest,
                              double bulk) {
   DisjointSets faces(triangles.size());
-  if (triangles.empty() || !join_opposite_sides(rest.size() / 3, triangles, faces))
+  if (triangles.empty() || !mesh::join_opposite_sides(rest.size() / 3, triangles, faces))
     throw Error("its surface is not closed, expected a closed one to keep its volume");
   std::map<std::uint32_t, std::size_t> part_of;
   for (std::uint32_t t = 0; t < triangles.size(); ++t) {
@@ -105,4 +105,4 @@ void MotionVolumes::correct(Numbers& v) const {
     add(v, -by[k], parts_[static_cast<std::size_t>(k)].response);
 }
 
-} // namespace gewebe
+} // namespace gewebe::integrator

@@ -19,7 +19,7 @@
 #include <span>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::integrator {
 
 class MotionVolumes {
 public:
@@ -53,4 +53,4 @@ private:
   double elastic_ = 0;
 };
 
-} // namespace gewebe
+} // namespace gewebe::integrator

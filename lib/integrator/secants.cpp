@@ -6,7 +6,7 @@
 #include <cmath>
 #include <utility>
 
-namespace gewebe {
+namespace gewebe::integrator {
 
 void Secants::drop(std::size_t oldest) {
   for (std::size_t k = 0; k + oldest < count_; ++k) {
@@ -95,4 +95,4 @@ void Secants::restore(const Parts& first, Numbers& direction, const Context& con
   });
 }
 
-} // namespace gewebe
+} // namespace gewebe::integrator

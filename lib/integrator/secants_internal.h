@@ -8,7 +8,7 @@
 #include <memory>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::integrator {
 
 /// What L-BFGS knows of rounds (Nocedal, Wright, Numerical optimization, 2006, 7.2), in single
 /// precision. Products of pairs with each other are kept, so that a direction takes four passes
@@ -46,4 +46,4 @@ private:
   std::size_t count_ = 0, earlier_ = 0;
 };
 
-} // namespace gewebe
+} // namespace gewebe::integrator

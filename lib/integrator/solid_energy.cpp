@@ -6,7 +6,7 @@
 
 #include <algorithm>
 
-namespace gewebe {
+namespace gewebe::integrator {
 
 namespace {
 
@@ -28,7 +28,7 @@ SolidEnergy::SolidEnergy(const MotionBody& body, const SolidNet& net,
   if (!body.mesh.middles.empty())
     bubbles_.write().resize(body.elements.size());
   new_bubbles_ = *bubbles_;
-  for (const SolidElement& e : body.elements)
+  for (const fem::SolidElement& e : body.elements)
     unsure_at_rest_ += 1e-14 * e.material.mu * e.volume;
 }
 
@@ -53,13 +53,13 @@ void SolidEnergy::forget_bubbles() {
 
 double SolidEnergy::hyperelastic(const Numbers& at, std::span<double> forces,
                                  const Context& context) {
-  const std::size_t count = solid_nodes(body_.mesh);
+  const std::size_t count = fem::solid_nodes(body_.mesh);
   Numbers energy(body_.elements.size());
   std::vector<std::array<Vec3, 10>> part(body_.elements.size());
   const bool worth = body_.elements.size() >= (count == 10 ? worth_quadratic : worth_linear);
   const auto respond = [&](std::size_t begin, std::size_t end) {
     std::array<std::array<Vec3, 10>, 4> u;
-    std::array<HyperelasticForces, 4> of;
+    std::array<fem::HyperelasticForces, 4> of;
     std::array<Vec3, 4> bubbles;
     for (std::size_t t = begin; t < end; t += 4) {
       const std::size_t together = std::min<std::size_t>(4, end - t);
@@ -68,8 +68,8 @@ double SolidEnergy::hyperelastic(const Numbers& at, std::span<double> forces,
         if (count == 10)
           bubbles[k] = (at_rest_ ? new_bubbles_ : *bubbles_)[t + k];
       }
-      hyperelastic_forces(std::span(body_.elements).subspan(t, together), count, u, bubbles, {},
-                          of);
+      fem::hyperelastic_forces(std::span(body_.elements).subspan(t, together), count, u, bubbles,
+                               {}, of);
       for (std::size_t k = 0; k < together; ++k) {
         if (count == 10)
           new_bubbles_[t + k] = bubbles[k];
@@ -85,7 +85,7 @@ double SolidEnergy::hyperelastic(const Numbers& at, std::span<double> forces,
     sum += energy[t];
     for (std::size_t a = 0; a < count; ++a)
       for (int i = 0; i < 3; ++i)
-        forces[3 * std::size_t{solid_node(body_.mesh, t, a)} + static_cast<std::size_t>(i)] +=
+        forces[3 * std::size_t{fem::solid_node(body_.mesh, t, a)} + static_cast<std::size_t>(i)] +=
             part[t][a][i];
   }
   return sum;
@@ -93,8 +93,8 @@ double SolidEnergy::hyperelastic(const Numbers& at, std::span<double> forces,
 
 std::array<Vec3, 10> SolidEnergy::displacements(const Numbers& at, std::size_t t) const {
   std::array<Vec3, 10> u;
-  for (std::size_t a = 0; a < solid_nodes(body_.mesh); ++a) {
-    const std::size_t axis = 3 * std::size_t{solid_node(body_.mesh, t, a)};
+  for (std::size_t a = 0; a < fem::solid_nodes(body_.mesh); ++a) {
+    const std::size_t axis = 3 * std::size_t{fem::solid_node(body_.mesh, t, a)};
     u[a] = {at[axis] - body_.rest[axis], at[axis + 1] - body_.rest[axis + 1],
             at[axis + 2] - body_.rest[axis + 2]};
   }
@@ -123,4 +123,4 @@ double SolidEnergy::evaluate(const Numbers& at, const StepDamping& damping,
   return energy;
 }
 
-} // namespace gewebe
+} // namespace gewebe::integrator

@@ -15,7 +15,7 @@
 #include <span>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::integrator {
 
 /// What damping takes in a step; nothing at rest.
 struct StepDamping {
@@ -66,7 +66,7 @@ public:
   /// From the next evaluation on frame() is known.
   void note_frames() { frames_.note_all(); }
   /// \pre note_frames(), or the law is Neo-Hookean, or the way is that of the reference
-  ElementFrame frame(std::size_t t) const { return frames_.frame(t); }
+  fem::ElementFrame frame(std::size_t t) const { return frames_.frame(t); }
   Vec3 bubble(std::size_t t) const { return new_bubbles_.empty() ? Vec3{} : new_bubbles_[t]; }
   /// Of the nodes of tetrahedron t.
   std::array<Vec3, 10> displacements(const Numbers& at, std::size_t t) const;
@@ -78,11 +78,11 @@ private:
   SolidLaw law_;
   MotionSprings springs_;
   MotionVolumes volumes_;
-  CorotationalSolid frames_;               ///< and corotational energy, and damping
+  fem::CorotationalSolid frames_;          ///< and corotational energy, and damping
   CopyOnWrite<std::vector<Vec3>> bubbles_; ///< of quadratic Neo-Hookean elements
   std::vector<Vec3> new_bubbles_;
   bool at_rest_ = false;
   double elastic_ = 0, unsure_at_rest_ = 0;
 };
 
-} // namespace gewebe
+} // namespace gewebe::integrator

@@ -19,24 +19,24 @@
 #include <numbers>
 #include <utility>
 
-namespace gewebe {
+namespace gewebe::integrator {
 
 namespace {
 
-MotionBody body_of(const TetMesh& mesh, std::span<const SolidMaterial> materials,
+MotionBody body_of(const tetrahedra::TetMesh& mesh, std::span<const fem::SolidMaterial> materials,
                    const SolidNet& net, double drag, const Context& context) {
   MotionBody body;
   body.mesh = mesh;
-  body.elements = solid_elements(mesh, materials, context);
-  body.masses = solid_masses(mesh, materials);
+  body.elements = fem::solid_elements(mesh, materials, context);
+  body.masses = fem::solid_masses(mesh, materials);
   for (const Vec3& p : mesh.points)
     body.rest.insert(body.rest.end(), {p.x, p.y, p.z});
   body.drag.assign(net.drag.begin(), net.drag.end());
   body.drag.resize(body.nodes(), drag);
   body.in_elements.resize(body.nodes());
   for (std::size_t t = 0; t < mesh.tetrahedra.size(); ++t)
-    for (std::size_t a = 0; a < solid_nodes(mesh); ++a)
-      body.in_elements[solid_node(mesh, t, a)] = 1;
+    for (std::size_t a = 0; a < fem::solid_nodes(mesh); ++a)
+      body.in_elements[fem::solid_node(mesh, t, a)] = 1;
   for (std::size_t i = 0; i < std::min(body.nodes(), net.masses.size()); ++i)
     body.masses[i] =
         body.in_elements[i] == 0 ? net.masses[i] : std::max(body.masses[i], net.masses[i]);
@@ -59,7 +59,7 @@ struct SolidMotion::State {
   SolidMotionOptions options;
   MotionBody body;
   MotionState now;
-  SolidMemory memory;
+  viscous::SolidMemory memory;
   SolidEnergy energy;
   double elastic = 0;      ///< energy of now.place
   double allowed = 0;      ///< at the end of the last step, of all kinds
@@ -101,8 +101,8 @@ struct SolidMotion::State {
   /// `last_step` begins with it.
   bool keeps_tangent = false;
 
-  State(const TetMesh& mesh, std::span<const SolidMaterial> materials, const SolidNet& net,
-        const SolidMotionOptions& with, const Context& context)
+  State(const tetrahedra::TetMesh& mesh, std::span<const fem::SolidMaterial> materials,
+        const SolidNet& net, const SolidMotionOptions& with, const Context& context)
       : options(with), body(body_of(mesh, materials, net, with.drag, context)),
         memory(body.mesh, materials, body.elements), energy(body, net, with),
         recovery(body, materials, net, with) {
@@ -131,13 +131,14 @@ SolidMotion::~SolidMotion() = default;
 SolidMotion::SolidMotion(SolidMotion&&) noexcept = default;
 SolidMotion& SolidMotion::operator=(SolidMotion&&) noexcept = default;
 
-SolidMotion::SolidMotion(const TetMesh& mesh, std::span<const SolidMaterial> materials,
+SolidMotion::SolidMotion(const tetrahedra::TetMesh& mesh,
+                         std::span<const fem::SolidMaterial> materials,
                          const SolidMotionOptions& options, const Context& context)
     : SolidMotion(mesh, materials, SolidNet{}, options, context) {}
 
-SolidMotion::SolidMotion(const TetMesh& mesh, std::span<const SolidMaterial> materials,
-                         const SolidNet& net, const SolidMotionOptions& options,
-                         const Context& context)
+SolidMotion::SolidMotion(const tetrahedra::TetMesh& mesh,
+                         std::span<const fem::SolidMaterial> materials, const SolidNet& net,
+                         const SolidMotionOptions& options, const Context& context)
     : state_(std::make_unique<State>(mesh, materials, net, options, context)) {
   const auto sound = [](double value) { return value >= 0 && std::isfinite(value); };
   if (!sound(options.drag) || !sound(options.damping))
@@ -847,10 +848,10 @@ void SolidMotion::restore(std::span<const double> places, std::span<const double
   s.stand(elapsed, context);
 }
 
-MemoryState SolidMotion::memory() const {
+viscous::MemoryState SolidMotion::memory() const {
   return state_->memory.state();
 }
-void SolidMotion::set_memory(const MemoryState& memory) {
+void SolidMotion::set_memory(const viscous::MemoryState& memory) {
   state_->memory.restore(memory);
 }
 bool SolidMotion::fades() const noexcept {
@@ -859,7 +860,7 @@ bool SolidMotion::fades() const noexcept {
 
 struct SolidMotion::Past {
   KeptStep energy;
-  MemoryState memory;
+  viscous::MemoryState memory;
   double elastic = 0, last_step = 0;
   MotionForecast forecast;
   MotionQuick::Past quick;
@@ -934,4 +935,4 @@ double SolidMotion::potential_energy() const {
   return state_->elastic - work_of_load(state_->body, state_->now.load, state_->now.place);
 }
 
-} // namespace gewebe
+} // namespace gewebe::integrator

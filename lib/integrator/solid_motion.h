@@ -66,7 +66,7 @@
 #include <span>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::integrator {
 
 /// Small strains in frames that rotate; or the hyperelastic law of each material, stable
 /// Neo-Hookean unless it is said otherwise, never the classical one.
@@ -144,10 +144,10 @@ public:
   /// mass, in the net; ends of springs are nodes
   /// \throw Error as solid_elements and MotionVolumes; if an option is out of its range, or a node
   /// has no mass
-  SolidMotion(const TetMesh& mesh, std::span<const SolidMaterial> materials,
+  SolidMotion(const tetrahedra::TetMesh& mesh, std::span<const fem::SolidMaterial> materials,
               const SolidMotionOptions& options, const Context& context = {});
-  SolidMotion(const TetMesh& mesh, std::span<const SolidMaterial> materials, const SolidNet& net,
-              const SolidMotionOptions& options, const Context& context = {});
+  SolidMotion(const tetrahedra::TetMesh& mesh, std::span<const fem::SolidMaterial> materials,
+              const SolidNet& net, const SolidMotionOptions& options, const Context& context = {});
   ~SolidMotion();
   SolidMotion(SolidMotion&&) noexcept;
   SolidMotion& operator=(SolidMotion&&) noexcept;
@@ -194,9 +194,9 @@ public:
   void restore(std::span<const double> places, std::span<const double> velocity,
                const Context& context = {}, double elapsed = 0);
   /// What a viscoelastic body remembers.
-  MemoryState memory() const;
+  viscous::MemoryState memory() const;
   /// As if it had come where it is by this, until it is moved. \pre memory() of such a body
-  void set_memory(const MemoryState& memory);
+  void set_memory(const viscous::MemoryState& memory);
   /// Whether it is viscoelastic and the last step changed its memory.
   bool fades() const noexcept;
   /// What earlier steps leave to the next ones, beside places and velocities: secants,
@@ -279,4 +279,4 @@ private:
   std::unique_ptr<State> state_;
 };
 
-} // namespace gewebe
+} // namespace gewebe::integrator

@@ -11,7 +11,7 @@
 #include <cmath>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::labels {
 namespace {
 
 double depth(double value, const GreyDensityOptions& options) {
@@ -73,8 +73,8 @@ void look(const GreyVolume& scan, const GreyDensityOptions& options, GreyDensity
   if (r.voxels == 0 || r.voxels == scan.values.size())
     throw Error(std::string(r.voxels == 0 ? "no" : "every") +
                 " voxel lies within the thresholds; values go from " +
-                six_digits(static_cast<double>(r.min)) + " to " +
-                six_digits(static_cast<double>(r.max)));
+                text::six_digits(static_cast<double>(r.min)) + " to " +
+                text::six_digits(static_cast<double>(r.max)));
 }
 
 double width_of(const Context& context, const GreyVolume& scan, const GreyDensityOptions& options) {
@@ -90,9 +90,9 @@ double width_of(const Context& context, const GreyVolume& scan, const GreyDensit
 }
 
 /// The densities on the scan's own lattice.
-Grid own_density(const Context& context, const GreyVolume& scan, const GreyDensityOptions& options,
-                 double width) {
-  GridInfo info;
+volume::Grid own_density(const Context& context, const GreyVolume& scan,
+                         const GreyDensityOptions& options, double width) {
+  volume::GridInfo info;
   info.transform = scan.transform;
   const Int3 leaves_of{(scan.size[0] + 7) / 8, (scan.size[1] + 7) / 8, (scan.size[2] + 7) / 8};
   std::vector<Int3> origins;
@@ -100,11 +100,11 @@ Grid own_density(const Context& context, const GreyVolume& scan, const GreyDensi
     for (std::int32_t j = 0; j < leaves_of[1]; ++j)
       for (std::int32_t k = 0; k < leaves_of[2]; ++k)
         origins.push_back({8 * i, 8 * j, 8 * k});
-  GridBuilder builder(info);
-  const std::vector<LeafRef> leaves = builder.add_leaves(context, origins);
+  volume::GridBuilder builder(info);
+  const std::vector<volume::LeafRef> leaves = builder.add_leaves(context, origins);
   parallel_blocks(context, leaves.size(), 16, [&](std::size_t begin, std::size_t end) {
     for (std::size_t n = begin; n < end; ++n) {
-      const LeafRef& leaf = leaves[n];
+      const volume::LeafRef& leaf = leaves[n];
       Int3 last{};
       for (std::size_t a = 0; a < 3; ++a)
         last[a] = std::min(leaf.origin[a] + 8, scan.size[a]);
@@ -116,7 +116,7 @@ Grid own_density(const Context& context, const GreyVolume& scan, const GreyDensi
             const double density = d == d ? std::clamp(0.5 + d / (2 * width), 0.0, 1.0) : 0;
             if (density == 0)
               continue;
-            const auto offset = static_cast<std::size_t>(leaf_offset({i, j, k}));
+            const auto offset = static_cast<std::size_t>(volume::leaf_offset({i, j, k}));
             leaf.values[offset] = static_cast<float>(density);
             leaf.active[offset / 64] |= std::uint64_t{1} << (offset % 64);
           }
@@ -128,8 +128,8 @@ Grid own_density(const Context& context, const GreyVolume& scan, const GreyDensi
 
 } // namespace
 
-Grid grey_density(const Context& context, const GreyVolume& scan, const GreyDensityOptions& options,
-                  GreyDensityReport* report) {
+volume::Grid grey_density(const Context& context, const GreyVolume& scan,
+                          const GreyDensityOptions& options, GreyDensityReport* report) {
   GreyDensityReport local;
   GreyDensityReport& r = report != nullptr ? *report : local;
   r = {};
@@ -138,18 +138,21 @@ Grid grey_density(const Context& context, const GreyVolume& scan, const GreyDens
   LabelMask box;
   box.size = scan.size;
   box.transform = scan.transform;
-  const GridTransform lattice = label_lattice(box, options.voxel.value_or(smallest), &r.shear);
+  const volume::GridTransform lattice =
+      label_lattice(box, options.voxel.value_or(smallest), &r.shear);
   look(scan, options, r);
   require_memory(context, 6.0 * sizeof(float) * static_cast<double>(scan.values.size()),
                  "the density of the scan");
   r.width = width_of(context, scan, options);
   if (!(r.width > 0))
     throw Error("no finite value lies next to the thresholds");
-  const Grid own = own_density(context, scan, options, r.width);
+  const volume::Grid own = own_density(context, scan, options, r.width);
   Int3 last{};
   for (std::size_t a = 0; a < 3; ++a)
     last[a] = scan.size[a] - 1;
-  return same_lattice(scan.transform, lattice, {}, last) ? own : resample(context, own, lattice);
+  return volume::same_lattice(scan.transform, lattice, {}, last)
+             ? own
+             : volume::resample(context, own, lattice);
 }
 
-} // namespace gewebe
+} // namespace gewebe::labels

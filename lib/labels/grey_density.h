@@ -15,7 +15,7 @@
 #include <limits>
 #include <optional>
 
-namespace gewebe {
+namespace gewebe::labels {
 
 struct GreyDensityOptions {
   double low = -std::numeric_limits<double>::infinity(); ///< one of both is finite
@@ -38,7 +38,7 @@ struct GreyDensityReport {
 /// \throw Error if no voxel, or every voxel, lies within the thresholds; for oblique axes as
 /// label_lattice, for voxels as resample; if context.max_memory would not do
 /// \pre low < high, values.size() is that of the box
-Grid grey_density(const Context& context, const GreyVolume& scan, const GreyDensityOptions& options,
-                  GreyDensityReport* report = nullptr);
+volume::Grid grey_density(const Context& context, const GreyVolume& scan,
+                          const GreyDensityOptions& options, GreyDensityReport* report = nullptr);
 
-} // namespace gewebe
+} // namespace gewebe::labels

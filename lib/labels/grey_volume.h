@@ -6,14 +6,14 @@
 #include <cstddef>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::labels {
 
 /// A box of voxels on any affine lattice. Voxel (i, j, k) has its centre at world transform(i, j,
 /// k) and the value values[(k·size[1] + j)·size[0] + i]: Hounsfield units of a CT, or whatever the
 /// scan has; NaN where it has none.
 struct GreyVolume {
   Int3 size{}; ///< voxels along i, j, k
-  GridTransform transform;
+  volume::GridTransform transform;
   std::vector<float> values;
 
   std::size_t row(std::int32_t j, std::int32_t k) const {
@@ -23,4 +23,4 @@ struct GreyVolume {
   }
 };
 
-} // namespace gewebe
+} // namespace gewebe::labels

@@ -10,14 +10,14 @@
 #include <bit>
 #include <cmath>
 
-namespace gewebe {
+namespace gewebe::labels {
 namespace {
 
 constexpr double largest_ratio = 6;
 
 using Matrix = std::array<Vec3, 3>; // columns
 
-Matrix columns_of(const GridTransform& t) {
+Matrix columns_of(const volume::GridTransform& t) {
   return {Vec3{t.m[0], t.m[4], t.m[8]}, Vec3{t.m[1], t.m[5], t.m[9]},
           Vec3{t.m[2], t.m[6], t.m[10]}};
 }
@@ -177,7 +177,7 @@ std::int32_t kind_of_cube(const LabelField& field, const Sampling& sampling, con
 
 /// Where the grid has tiles, and which of its leaves the band meets.
 struct Plan {
-  std::vector<TileView> tiles;
+  std::vector<volume::TileView> tiles;
   std::vector<Int3> leaves;
 };
 
@@ -247,7 +247,7 @@ std::uint64_t count_bits(const LabelMask& mask) {
 
 } // namespace
 
-GridTransform label_lattice(const LabelMask& mask, double voxel, double* shear) {
+volume::GridTransform label_lattice(const LabelMask& mask, double voxel, double* shear) {
   const Matrix file = columns_of(mask.transform);
   Matrix unit{};
   std::array<double, 3> spacing{};
@@ -275,9 +275,9 @@ GridTransform label_lattice(const LabelMask& mask, double voxel, double* shear) 
   const double smallest = *std::min_element(spacing.begin(), spacing.end());
   if (!(farthest <= 0.1 * smallest))
     throw Error("the axes are oblique: right angles would move a corner by " +
-                six_digits(farthest) + " mm, expected at most a tenth of the spacing of " +
-                six_digits(smallest) + " mm");
-  GridTransform t;
+                text::six_digits(farthest) + " mm, expected at most a tenth of the spacing of " +
+                text::six_digits(smallest) + " mm");
+  volume::GridTransform t;
   for (std::size_t row = 0; row < 3; ++row) {
     for (std::size_t a = 0; a < 3; ++a)
       t.m[4 * row + a] = rotation.at(a)[static_cast<int>(row)] * voxel;
@@ -295,9 +295,9 @@ void lay_out(const LabelMask& mask, const LabelDensityOptions& options, LabelFie
   const double smallest = std::fmin(size.x, std::fmin(size.y, size.z));
   sampling.voxel = options.voxel.value_or(smallest);
   if (!(sampling.voxel <= largest_ratio * smallest))
-    throw Error("a voxel of " + six_digits(sampling.voxel) + " mm over labels every " +
-                six_digits(smallest) + " mm, expected at most " +
-                six_digits(largest_ratio * smallest));
+    throw Error("a voxel of " + text::six_digits(sampling.voxel) + " mm over labels every " +
+                text::six_digits(smallest) + " mm, expected at most " +
+                text::six_digits(largest_ratio * smallest));
   for (std::size_t a = 0; a < 3; ++a) {
     field.spacing[a] = size[static_cast<int>(a)];
     sampling.ratio[a] = sampling.voxel / field.spacing[a];
@@ -322,8 +322,8 @@ void check_label_density(const Context& context, const LabelMask& mask,
                  "the lattice of the labels");
 }
 
-Grid label_density(const Context& context, const LabelMask& mask,
-                   const LabelDensityOptions& options, LabelDensityReport* report) {
+volume::Grid label_density(const Context& context, const LabelMask& mask,
+                           const LabelDensityOptions& options, LabelDensityReport* report) {
   LabelDensityReport local;
   LabelDensityReport& r = report != nullptr ? *report : local;
   r = {};
@@ -334,33 +334,33 @@ Grid label_density(const Context& context, const LabelMask& mask,
   LabelField field;
   Sampling sampling;
   lay_out(mask, options, field, sampling);
-  GridInfo info;
+  volume::GridInfo info;
   info.transform = label_lattice(mask, sampling.voxel, &r.shear);
   r.voxels = count_bits(mask);
   r.volume = static_cast<double>(r.voxels) * size.x * size.y * size.z;
   field.mask = mask;
   find_band(quiet, field);
-  r.band_voxels = field.band.size() * leaf_voxels;
+  r.band_voxels = field.band.size() * volume::leaf_voxels;
   r.leaves_skipped = field.directory.size() - field.band.size();
   double finer = 1; // leaves of the grid for each block
   for (const double ratio : sampling.ratio)
     finer *= 1 / ratio + 0.5;
   require_memory(context,
-                 label_field_bytes(field) +
-                     static_cast<double>(field.band.size()) * finer * (leaf_voxels * 4.0 + 200),
+                 label_field_bytes(field) + static_cast<double>(field.band.size()) * finer *
+                                                (volume::leaf_voxels * 4.0 + 200),
                  "the density of the labels");
   const Plan plan = plan_grid(quiet, field, sampling);
   solve_label_field(context, field, r);
 
-  GridBuilder builder(info);
-  for (const TileView& tile : plan.tiles)
+  volume::GridBuilder builder(info);
+  for (const volume::TileView& tile : plan.tiles)
     builder.add_tile(tile);
-  const std::vector<LeafRef> leaves = builder.add_leaves(quiet, plan.leaves);
+  const std::vector<volume::LeafRef> leaves = builder.add_leaves(quiet, plan.leaves);
   parallel_blocks(quiet, leaves.size(), 16, [&](std::size_t begin, std::size_t end) {
     LeafSampler sampler(field, sampling);
     for (std::size_t n = begin; n < end; ++n) {
       sampler.sample(leaves[n].origin, leaves[n].values);
-      for (std::size_t v = 0; v < leaf_voxels; ++v)
+      for (std::size_t v = 0; v < volume::leaf_voxels; ++v)
         if (leaves[n].values[v] != 0)
           leaves[n].active[v / 64] |= std::uint64_t{1} << (v % 64);
     }
@@ -368,4 +368,4 @@ Grid label_density(const Context& context, const LabelMask& mask,
   return builder.finish();
 }
 
-} // namespace gewebe
+} // namespace gewebe::labels

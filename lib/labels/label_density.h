@@ -36,7 +36,7 @@
 #include <cstdint>
 #include <optional>
 
-namespace gewebe {
+namespace gewebe::labels {
 
 struct LabelDensityOptions {
   std::optional<double> voxel; ///< edge S in mm; the smallest spacing if absent
@@ -58,7 +58,7 @@ struct LabelDensityReport {
 /// (0, 0, 0) on that of the mask. \param shear receives LabelDensityReport::shear
 /// \throw Error if the axes are so oblique that a corner would move by more than a tenth of the
 /// smallest spacing
-GridTransform label_lattice(const LabelMask& mask, double voxel, double* shear = nullptr);
+volume::GridTransform label_lattice(const LabelMask& mask, double voxel, double* shear = nullptr);
 
 /// What can be said against a density before a voxel is known: `mask` needs no bits yet. Memory is
 /// that of the copy of the mask, of its blocks and of the lattice; what the boundary takes comes to
@@ -74,7 +74,8 @@ void check_label_density(const Context& context, const LabelMask& mask,
 /// the result. \pre mask.transform is finite and not singular
 /// \throw Error if the lattice is too oblique, if S is more than 6 times the smallest spacing, if
 /// an index would leave ±2^30, if context.max_memory would not do
-Grid label_density(const Context& context, const LabelMask& mask,
-                   const LabelDensityOptions& options, LabelDensityReport* report = nullptr);
+volume::Grid label_density(const Context& context, const LabelMask& mask,
+                           const LabelDensityOptions& options,
+                           LabelDensityReport* report = nullptr);
 
-} // namespace gewebe
+} // namespace gewebe::labels

@@ -13,7 +13,7 @@
 #include <functional>
 #include <limits>
 
-namespace gewebe {
+namespace gewebe::labels {
 namespace {
 
 constexpr std::size_t block_voxels = 512;
@@ -381,4 +381,4 @@ double label_field_bytes(const LabelField& field) {
          8.0 * static_cast<double>(field.mask.bits.size());
 }
 
-} // namespace gewebe
+} // namespace gewebe::labels

@@ -11,7 +11,7 @@
 #include <cstdint>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::labels {
 
 /// One level of the solution. Blocks of 8³ voxels, i fastest: offset i + 8 j + 64 k. A directory
 /// covers the labels' box and at least 8 voxels more on each side.
@@ -75,4 +75,4 @@ LabelBounds label_bounds(const LabelField& field);
 /// Bytes that solving needs, all levels.
 double label_field_bytes(const LabelField& field);
 
-} // namespace gewebe
+} // namespace gewebe::labels

@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
-namespace gewebe {
+namespace gewebe::labels {
 namespace {
 
 constexpr std::size_t block_voxels = 512;
@@ -151,4 +151,4 @@ void keep_volume(const Context& context, LabelField& field) {
   });
 }
 
-} // namespace gewebe
+} // namespace gewebe::labels

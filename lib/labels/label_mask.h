@@ -8,13 +8,13 @@
 #include <cstdint>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::labels {
 
 /// A box of voxels on any affine lattice. Voxel (i, j, k) has its centre at world transform(i, j,
 /// k); what lies outside the box belongs to no label.
 struct LabelMask {
   Int3 size{}; ///< voxels along i, j, k
-  GridTransform transform;
+  volume::GridTransform transform;
   /// Row (j, k) begins at word (k·size[1] + j)·row_words(); voxel i is bit i & 63 of word i >> 6.
   /// Bits beyond size[0] are 0.
   std::vector<std::uint64_t> bits;
@@ -33,4 +33,4 @@ struct LabelMask {
   }
 };
 
-} // namespace gewebe
+} // namespace gewebe::labels

@@ -9,7 +9,7 @@
 #include <span>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::labels {
 
 /// A box of voxels on any affine lattice, each row as runs of equal labels: organs take some bytes
 /// a row, where an array would take as much as the scan. Voxel (i, j, k) has its centre at world
@@ -21,7 +21,7 @@ struct LabelRuns {
     bool operator==(const Run&) const = default;
   };
   Int3 size{}; ///< voxels along i, j, k
-  GridTransform transform;
+  volume::GridTransform transform;
   /// Row (j, k), r = k·size[1] + j, is runs[rows[r]] up to runs[rows[r + 1]], ascending; the last
   /// one ends at size[0]. \pre rows begins with 0 and has size[1]·size[2] + 1 entries
   std::vector<Run> runs;
@@ -40,4 +40,4 @@ struct LabelRuns {
   }
 };
 
-} // namespace gewebe
+} // namespace gewebe::labels

@@ -1,6 +1,6 @@
 #include "labels/label_step_kernel_internal.h"
 
-namespace gewebe {
+namespace gewebe::labels {
 
 float label_step_avx2(const LabelStep& step, const float* y,
                       const std::array<const float*, 6>& neighbours, const float* target,
@@ -8,4 +8,4 @@ float label_step_avx2(const LabelStep& step, const float* y,
   return label_step(step, y, neighbours, target, distance, value);
 }
 
-} // namespace gewebe
+} // namespace gewebe::labels

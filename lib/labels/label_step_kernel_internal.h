@@ -5,7 +5,7 @@
 #include <array>
 #include <cstddef>
 
-namespace gewebe {
+namespace gewebe::labels {
 
 struct LabelStep {
   std::array<float, 3> weight; ///< w_a
@@ -140,4 +140,4 @@ inline float label_step(const LabelStep& step, const float* y,
 }
 
 } // namespace
-} // namespace gewebe
+} // namespace gewebe::labels

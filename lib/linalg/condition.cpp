@@ -15,7 +15,7 @@
 // a Real or Complex Matrix, 1988. Inverse iteration: Golub, Van Loan, Matrix Computations, 4th ed.,
 // 8.2.2.
 
-namespace gewebe {
+namespace gewebe::linalg {
 
 namespace {
 
@@ -189,8 +189,8 @@ struct RigidMotions {
   Eigen::VectorXd share; ///< of a prescribed unit displacement in each of them
 };
 
-RigidMotions rigid_motions(const Model& model, const StiffnessMatrix& matrix, const Parts& parts,
-                           std::size_t part, const std::vector<double>& x) {
+RigidMotions rigid_motions(const model::Model& model, const StiffnessMatrix& matrix,
+                           const Parts& parts, std::size_t part, const std::vector<double>& x) {
   const std::vector<std::size_t>& rows = parts.rows[part];
   Box3 box;
   for (const std::size_t row : rows)
@@ -297,7 +297,7 @@ std::optional<Factor> shifted_factor(const StiffnessMatrix& matrix, double norm,
 
 } // namespace
 
-std::optional<FreeMotion> weakest_motion(const Model& model, const StiffnessMatrix& matrix,
+std::optional<FreeMotion> weakest_motion(const model::Model& model, const StiffnessMatrix& matrix,
                                          const Context& context) {
   // A matrix of zeros is as singular as one can be, whatever the scale.
   const double norm = std::max(stiffness_norm(matrix), 1e-300);
@@ -342,7 +342,7 @@ std::optional<FreeMotion> weakest_motion(const Model& model, const StiffnessMatr
         motion.direction[p.axis] = x[row];
     motion.direction = motion.direction / gewebe::norm(motion.direction);
   }
-  motion.component = components(model).of_node[motion.node];
+  motion.component = model::components(model).of_node[motion.node];
   return motion;
 }
 
@@ -394,8 +394,8 @@ std::string motion_text(const FreeMotion& motion) {
 
 namespace {
 
-[[noreturn]] void refuse(const Model& model, const StiffnessMatrix& matrix, const Context& context,
-                         double condition) {
+[[noreturn]] void refuse(const model::Model& model, const StiffnessMatrix& matrix,
+                         const Context& context, double condition) {
   const std::optional<FreeMotion> motion = weakest_motion(model, matrix, context);
   // Beyond 2^52 rounding alone decides what the condition is, and whether a pivot is positive.
   const std::string how = condition > 0 && condition < 0x1p52
@@ -427,8 +427,8 @@ double worst_residual(const StiffnessMatrix& matrix, const Factor& factor, doubl
 
 } // namespace
 
-Factor checked_factor(const Model& model, const StiffnessMatrix& matrix, const Context& context,
-                      StiffnessCheck& check) {
+Factor checked_factor(const model::Model& model, const StiffnessMatrix& matrix,
+                      const Context& context, StiffnessCheck& check) {
   check.norm = stiffness_norm(matrix);
   std::optional<Factor> factor;
   try {
@@ -446,4 +446,4 @@ Factor checked_factor(const Model& model, const StiffnessMatrix& matrix, const C
   return std::move(*factor);
 }
 
-} // namespace gewebe
+} // namespace gewebe::linalg

@@ -14,7 +14,7 @@
 #include <optional>
 #include <string>
 
-namespace gewebe {
+namespace gewebe::linalg {
 
 /// Beyond this condition a matrix counts as singular.
 inline constexpr double max_condition = 1e12;
@@ -66,7 +66,7 @@ struct FreeMotion {
 /// and what inverse iteration on a slightly shifted matrix finds. Nothing if the matrix has no
 /// Cholesky factor even when shifted, so that it is indefinite.
 /// \pre the matrix is of this model \throw Cancelled
-std::optional<FreeMotion> weakest_motion(const Model& model, const StiffnessMatrix& matrix,
+std::optional<FreeMotion> weakest_motion(const model::Model& model, const StiffnessMatrix& matrix,
                                          const Context& context);
 
 /// "component 0 can turn about an axis".
@@ -82,7 +82,7 @@ struct StiffnessCheck {
 /// \throw SingularStiffness naming the component, its free motion and a remedy if the condition
 /// exceeds max_condition; Error if the model is unstable at rest, as by springs far too short for
 /// their rest length; if a solution exceeds max_backward_error; what Factor throws
-Factor checked_factor(const Model& model, const StiffnessMatrix& matrix, const Context& context,
-                      StiffnessCheck& check);
+Factor checked_factor(const model::Model& model, const StiffnessMatrix& matrix,
+                      const Context& context, StiffnessCheck& check);
 
-} // namespace gewebe
+} // namespace gewebe::linalg

@@ -11,7 +11,7 @@
 #include <string>
 #include <utility>
 
-namespace gewebe {
+namespace gewebe::linalg {
 
 namespace {
 
@@ -94,7 +94,7 @@ struct Nodes {
   std::vector<std::size_t> start;       ///< n + 1, into
   std::vector<std::uint32_t> neighbour;
 
-  BlockGraph graph() const noexcept { return {start, neighbour, axes}; }
+  cholesky::BlockGraph graph() const noexcept { return {start, neighbour, axes}; }
 };
 
 template <class Visit> // visit(node, another behind it), each pair once
@@ -146,7 +146,8 @@ struct Entries {
   std::vector<Place> places;
 };
 
-Entries entries_of(const StiffnessMatrix& matrix, const Nodes& nodes, const FrontTree& tree) {
+Entries entries_of(const StiffnessMatrix& matrix, const Nodes& nodes,
+                   const cholesky::FrontTree& tree) {
   Entries entries;
   entries.start.assign(nodes.axes.size() + 1, 0);
   const auto visit = [&](const auto& each) {
@@ -183,9 +184,9 @@ struct Factor::State {
 
   // What depends on the pattern alone.
   Nodes nodes;
-  FrontTree tree;
+  cholesky::FrontTree tree;
   Entries entries;
-  std::vector<Front> fronts;
+  std::vector<cholesky::Front> fronts;
   std::vector<std::uint32_t> block; ///< fronts + 1: the first supernode of each
 
   explicit State(CpuLevel level) : cpu(level) {}
@@ -197,7 +198,7 @@ struct Factor::State {
       for (std::uint32_t a = 0; a < nodes.axes[node]; ++a)
         d.permutation.push_back(nodes.first_row[node] + a);
     d.order = static_cast<std::int64_t>(d.permutation.size());
-    FrontBlocks blocks = front_blocks(tree, nodes.axes, fronts);
+    cholesky::FrontBlocks blocks = cholesky::front_blocks(tree, nodes.axes, fronts);
     d.px = {0};
     for (std::size_t k = 0; k + 1 < blocks.super.size(); ++k) {
       const std::int64_t columns = blocks.super[k + 1] - blocks.super[k];
@@ -222,14 +223,14 @@ struct Factor::State {
     if (matrix.row.size() > UINT32_MAX)
       throw Error("the stiffness matrix is too large to be factorised");
     nodes = nodes_of(matrix);
-    tree = front_tree(nodes.graph(), elimination_order(nodes.graph()));
+    tree = cholesky::front_tree(nodes.graph(), cholesky::elimination_order(nodes.graph()));
     entries = entries_of(matrix, nodes, tree);
     fronts.resize(tree.fronts());
-    (void)measure_fronts(tree, nodes.axes, fronts);
+    (void)cholesky::measure_fronts(tree, nodes.axes, fronts);
     lay_out();
   }
 
-  void assemble(const StiffnessMatrix& matrix, const FrontAssembly& to) const {
+  void assemble(const StiffnessMatrix& matrix, const cholesky::FrontAssembly& to) const {
     const auto row = [&](std::size_t r) {
       const std::uint32_t node = nodes.of_row[r];
       return to.row[node] + (static_cast<std::uint32_t>(r) - nodes.first_row[node]);
@@ -246,7 +247,7 @@ struct Factor::State {
     const auto size = static_cast<std::size_t>(data.px.back());
     require_memory(context,
                    8 * static_cast<double>(size + data.s.size() + matrix.row.size()) +
-                       update_bytes(tree, fronts, false, thread_count(context)),
+                       cholesky::update_bytes(tree, fronts, false, thread_count(context)),
                    "the factor of the stiffness matrix");
     if (made == nullptr)
       made = std::make_unique_for_overwrite<double[]>(size);
@@ -254,12 +255,13 @@ struct Factor::State {
     for (std::size_t f = 0; f < fronts.size(); ++f)
       fronts[f].l = made.get() + data.px[block[f]];
     try {
-      (void)gewebe::factorise({.tree = tree,
-                               .axes = nodes.axes,
-                               .fronts = fronts,
-                               .assemble = [&](const FrontAssembly& to) { assemble(matrix, to); }},
-                              {}, context);
-    } catch (const PivotTooSmall& pivot) {
+      (void)gewebe::cholesky::factorise(
+          {.tree = tree,
+           .axes = nodes.axes,
+           .fronts = fronts,
+           .assemble = [&](const cholesky::FrontAssembly& to) { assemble(matrix, to); }},
+          {}, context);
+    } catch (const cholesky::PivotTooSmall& pivot) {
       throw NotPositiveDefinite(
           static_cast<std::size_t>(data.permutation[first_column(pivot.front) + pivot.column]));
     }
@@ -434,4 +436,4 @@ void solve_axes(const StiffnessMatrix& matrix, const Factor& factor, std::span<c
     u[static_cast<std::size_t>(matrix.axis_of_row[r])] = solved[r];
 }
 
-} // namespace gewebe
+} // namespace gewebe::linalg

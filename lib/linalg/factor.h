@@ -13,7 +13,7 @@
 #include <span>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::linalg {
 
 /// A supernodal factor as plain arrays, named as in cholmod_factor (lower, int64, 0-based), so that
 /// it can be stored. A supernode is what a front eliminates.
@@ -101,4 +101,4 @@ void solve_unit_axes(const StiffnessMatrix& matrix, const Factor& factor,
 void solve_axes(const StiffnessMatrix& matrix, const Factor& factor, std::span<const double> f,
                 std::span<double> u);
 
-} // namespace gewebe
+} // namespace gewebe::linalg

@@ -6,7 +6,7 @@
 #include <tuple>
 #include <utility>
 
-namespace gewebe {
+namespace gewebe::linalg {
 
 using namespace frontal;
 
@@ -33,7 +33,7 @@ bool FrontalFactor::State::held_alike(const Source& k, std::span<const std::uint
   return true;
 }
 
-std::vector<char> FrontalFactor::State::changed_rows(const Model& model,
+std::vector<char> FrontalFactor::State::changed_rows(const model::Model& model,
                                                      std::span<const std::uint32_t> origin,
                                                      std::span<const std::uint32_t> place) const {
   const std::size_t n = model.nodes.size();
@@ -50,18 +50,18 @@ std::vector<char> FrontalFactor::State::changed_rows(const Model& model,
   };
   const auto placed = [&](std::uint32_t old) { return place.empty() ? old : place[old]; };
   std::size_t b = 0;
-  for (const Spring& was : springs) {
+  for (const model::Spring& was : springs) {
     const std::uint32_t i = placed(was.i), j = placed(was.j);
     const auto key = std::tuple(was.kind, i, j);
     for (; b < model.springs.size(); ++b) {
-      const Spring& is = model.springs[b];
+      const model::Spring& is = model.springs[b];
       if (i == none || j == none || !(std::tie(is.kind, is.i, is.j) < key))
         break;
       mark(is.i);
       mark(is.j);
     }
     if (i != none && j != none && b < model.springs.size()) {
-      const Spring& is = model.springs[b];
+      const model::Spring& is = model.springs[b];
       if (std::tie(is.kind, is.i, is.j) == key) {
         ++b;
         if (is.stiffness == was.stiffness && is.rest == was.rest && !moved[i] && !moved[j])
@@ -210,9 +210,11 @@ void FrontalFactor::State::refactor(const Source& k, std::span<const std::uint32
 std::vector<char> FrontalFactor::State::grow(std::span<const std::uint32_t> order,
                                              const std::vector<char>& changed,
                                              std::span<const std::uint32_t> place) {
-  const FrontTree before = std::exchange(tree, front_tree(graph.view(), order));
-  std::vector<Front> had = std::exchange(fronts, std::vector<Front>(tree.fronts()));
-  std::vector<FrontMemory> held = std::exchange(memory, std::vector<FrontMemory>(tree.fronts()));
+  const cholesky::FrontTree before = std::exchange(tree, cholesky::front_tree(graph.view(), order));
+  std::vector<cholesky::Front> had =
+      std::exchange(fronts, std::vector<cholesky::Front>(tree.fronts()));
+  std::vector<cholesky::FrontMemory> held =
+      std::exchange(memory, std::vector<cholesky::FrontMemory>(tree.fronts()));
   std::vector<FrontLoad> carried =
       std::exchange(loads, std::vector<FrontLoad>(loads.empty() ? 0 : tree.fronts()));
   const auto placed = [&](std::uint32_t old) { return place.empty() ? old : place[old]; };
@@ -256,4 +258,4 @@ std::vector<char> FrontalFactor::State::grow(std::span<const std::uint32_t> orde
   return selected;
 }
 
-} // namespace gewebe
+} // namespace gewebe::linalg

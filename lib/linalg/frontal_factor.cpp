@@ -8,11 +8,11 @@
 #include <memory>
 #include <utility>
 
-namespace gewebe {
+namespace gewebe::linalg {
 
 using namespace frontal;
 
-FrontalFactor::FrontalFactor(const Model& model, const Context& context)
+FrontalFactor::FrontalFactor(const model::Model& model, const Context& context)
     : state_(std::make_unique<State>()) {
   state_->begin({.model = &model}, context);
 }
@@ -22,12 +22,14 @@ FrontalFactor::FrontalFactor(const NodeMatrix& matrix, const Context& context)
   state_->begin({.matrix = &matrix}, context);
 }
 
-FrontalFactor::FrontalFactor(const Model& model, FrontTree tree, const Context& context)
+FrontalFactor::FrontalFactor(const model::Model& model, cholesky::FrontTree tree,
+                             const Context& context)
     : state_(std::make_unique<State>()) {
   state_->begin({.model = &model}, std::move(tree), context);
 }
 
-FrontalFactor::FrontalFactor(const NodeMatrix& matrix, FrontTree tree, const Context& context)
+FrontalFactor::FrontalFactor(const NodeMatrix& matrix, cholesky::FrontTree tree,
+                             const Context& context)
     : state_(std::make_unique<State>()) {
   state_->begin({.matrix = &matrix}, std::move(tree), context);
 }
@@ -36,20 +38,24 @@ FrontalFactor::~FrontalFactor() = default;
 FrontalFactor::FrontalFactor(FrontalFactor&&) noexcept = default;
 FrontalFactor& FrontalFactor::operator=(FrontalFactor&&) noexcept = default;
 
-FrontalWork FrontalFactor::refactor(const Model& model, std::span<const std::uint32_t> origin,
-                                    std::span<const std::uint32_t> place, const Context& context) {
+cholesky::FrontalWork FrontalFactor::refactor(const model::Model& model,
+                                              std::span<const std::uint32_t> origin,
+                                              std::span<const std::uint32_t> place,
+                                              const Context& context) {
   state_->refactor({.model = &model}, origin, place, {}, context);
   return state_->work;
 }
 
-FrontalWork FrontalFactor::refactor(const NodeMatrix& matrix, std::span<const std::uint32_t> origin,
-                                    std::span<const std::uint32_t> place,
-                                    std::span<const std::uint32_t> rows, const Context& context) {
+cholesky::FrontalWork FrontalFactor::refactor(const NodeMatrix& matrix,
+                                              std::span<const std::uint32_t> origin,
+                                              std::span<const std::uint32_t> place,
+                                              std::span<const std::uint32_t> rows,
+                                              const Context& context) {
   state_->refactor({.matrix = &matrix}, origin, place, rows, context);
   return state_->work;
 }
 
-const FrontTree& FrontalFactor::tree() const noexcept {
+const cholesky::FrontTree& FrontalFactor::tree() const noexcept {
   return state_->tree;
 }
 
@@ -61,7 +67,7 @@ std::size_t FrontalFactor::entries() const noexcept {
   return state_->entries;
 }
 
-const FrontalWork& FrontalFactor::work() const noexcept {
+const cholesky::FrontalWork& FrontalFactor::work() const noexcept {
   return state_->work;
 }
 
@@ -174,4 +180,4 @@ std::array<double, 3> FrontalFactor::carried(const ForwardSolve& at) const {
   return u;
 }
 
-} // namespace gewebe
+} // namespace gewebe::linalg

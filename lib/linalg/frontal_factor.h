@@ -20,7 +20,7 @@
 #include <span>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::linalg {
 
 class FrontalFactor {
 public:
@@ -30,12 +30,12 @@ public:
   /// \throw NotPositiveDefinite (linalg/factor.h; its row is an axis, 3 i + a) where a pivot is
   /// less than its diagonal entry over max_condition, so that K's condition exceeds that; Error if
   /// no axis is free or memory exceeds the context's; Cancelled
-  FrontalFactor(const Model& model, const Context& context);
+  FrontalFactor(const model::Model& model, const Context& context);
   /// The same of a matrix, such as a solid's. \throw as above
   FrontalFactor(const NodeMatrix& matrix, const Context& context);
   /// The factor with a tree that another one of this matrix had: with its bits. \throw as above
-  FrontalFactor(const Model& model, FrontTree tree, const Context& context);
-  FrontalFactor(const NodeMatrix& matrix, FrontTree tree, const Context& context);
+  FrontalFactor(const model::Model& model, cholesky::FrontTree tree, const Context& context);
+  FrontalFactor(const NodeMatrix& matrix, cholesky::FrontTree tree, const Context& context);
   ~FrontalFactor();
   FrontalFactor(FrontalFactor&&) noexcept;
   FrontalFactor& operator=(FrontalFactor&&) noexcept;
@@ -45,20 +45,20 @@ public:
   /// CutModel). Both may be empty where nodes stayed. Equal to a fresh factor with the same tree,
   /// bit by bit; where nodes are held along other axes than before, it is one.
   /// \throw as the constructor; then the factor is of no use
-  FrontalWork refactor(const Model& model, std::span<const std::uint32_t> origin,
-                       std::span<const std::uint32_t> place, const Context& context);
+  cholesky::FrontalWork refactor(const model::Model& model, std::span<const std::uint32_t> origin,
+                                 std::span<const std::uint32_t> place, const Context& context);
 
   /// The same of a matrix. A node that is new counts as a copy of its origin, right behind which it
   /// is eliminated. \param rows ascending: nodes whose rows are others, new ones among them
   /// \pre it is the factor of a matrix
-  FrontalWork refactor(const NodeMatrix& matrix, std::span<const std::uint32_t> origin,
-                       std::span<const std::uint32_t> place, std::span<const std::uint32_t> rows,
-                       const Context& context);
+  cholesky::FrontalWork refactor(const NodeMatrix& matrix, std::span<const std::uint32_t> origin,
+                                 std::span<const std::uint32_t> place,
+                                 std::span<const std::uint32_t> rows, const Context& context);
 
-  const FrontTree& tree() const noexcept;
+  const cholesky::FrontTree& tree() const noexcept;
   std::size_t axes() const noexcept;    ///< 3 n
   std::size_t entries() const noexcept; ///< doubles in L
-  const FrontalWork& work() const noexcept;
+  const cholesky::FrontalWork& work() const noexcept;
   /// The least pivot of all, over its diagonal entry of K: the reciprocal bounds the condition of K
   /// from below.
   double weakest_pivot() const noexcept;
@@ -97,4 +97,4 @@ private:
   std::unique_ptr<State> state_;
 };
 
-} // namespace gewebe
+} // namespace gewebe::linalg

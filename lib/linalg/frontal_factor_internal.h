@@ -16,11 +16,11 @@
 #include <span>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::linalg {
 
 namespace frontal {
 
-inline constexpr std::uint32_t none = FrontTree::none;
+inline constexpr std::uint32_t none = cholesky::FrontTree::none;
 
 /// The free axes of a node.
 struct FreeAxes {
@@ -40,7 +40,7 @@ inline constexpr std::array<FreeAxes, 8> all_free_axes = [] {
 
 /// What K is made of: springs of a model, or a matrix.
 struct Source {
-  const Model* model = nullptr;
+  const model::Model* model = nullptr;
   const NodeMatrix* matrix = nullptr;
 
   std::size_t nodes() const { return model != nullptr ? model->nodes.size() : matrix->nodes(); }
@@ -70,20 +70,20 @@ struct FrontLoad {
 struct FrontalFactor::State {
   using Source = frontal::Source;
 
-  FrontTree tree;
-  std::vector<Front> fronts;
-  std::vector<FrontMemory> memory; // of L of each front
-  FrontalWork work;
+  cholesky::FrontTree tree;
+  std::vector<cholesky::Front> fronts;
+  std::vector<cholesky::FrontMemory> memory; // of L of each front
+  cholesky::FrontalWork work;
   CpuLevel cpu = CpuLevel::baseline;
 
   // Of the model as it was factorised, to tell what changed.
   SpringGraph graph;
-  std::vector<Spring> springs;
+  std::vector<model::Spring> springs;
   std::vector<Vec3> position;
   std::vector<std::uint8_t> fixed;
 
   // L in the solver's layout.
-  FrontBlocks blocks;
+  cholesky::FrontBlocks blocks;
   std::vector<const double*> values; // of each block
   std::vector<std::uint32_t> axis_of_row;
   std::vector<std::uint32_t> row_of_node; // the first of its axes, or none
@@ -95,14 +95,14 @@ struct FrontalFactor::State {
   std::vector<frontal::FrontLoad> loads; // of each front, or none: no load is carried
 
   /// The rows of the nodes that a front eliminates.
-  void assemble(const Source& k, const FrontAssembly& to) const;
+  void assemble(const Source& k, const cholesky::FrontAssembly& to) const;
 
   /// Each block between two nodes of the front comes once.
-  void add_blocks(const Source& k, const FrontAssembly& to,
+  void add_blocks(const Source& k, const cholesky::FrontAssembly& to,
                   std::vector<SymmetricBlock>& diagonals) const;
 
   /// Springs of the nodes that a front eliminates; each spring between two of them comes once.
-  void add_springs(const Source& k, const FrontAssembly& to,
+  void add_springs(const Source& k, const cholesky::FrontAssembly& to,
                    std::vector<SymmetricBlock>& diagonals) const;
 
   std::size_t axis_at(const Source& k, std::size_t f, std::size_t row) const;
@@ -126,7 +126,7 @@ struct FrontalFactor::State {
   /// Starts again: finds an elimination order and computes all fronts.
   void begin(const Source& k, const Context& context);
   /// Computes all fronts of this tree.
-  void begin(const Source& k, FrontTree with, const Context& context);
+  void begin(const Source& k, cholesky::FrontTree with, const Context& context);
 
   // ---- a load that is carried along, see FrontalFactor::carry
 
@@ -147,7 +147,7 @@ struct FrontalFactor::State {
   /// By node: whether its row of K is other than it was, its neighbours' numbers aside. Both lists
   /// of springs ascend alike where nodes keep their order, so one pass finds what differs; in
   /// another order more of them seem changed than are.
-  std::vector<char> changed_rows(const Model& model, std::span<const std::uint32_t> origin,
+  std::vector<char> changed_rows(const model::Model& model, std::span<const std::uint32_t> origin,
                                  std::span<const std::uint32_t> place) const;
 
   /// Whether the tree serves this graph too: the same nodes free, and no spring where none was.
@@ -176,4 +176,4 @@ struct FrontalFactor::State {
                          std::span<const std::uint32_t> place);
 };
 
-} // namespace gewebe
+} // namespace gewebe::linalg

@@ -11,7 +11,7 @@
 
 // Based on: Liu, The multifrontal method for sparse matrix solution: theory and practice, 1992.
 
-namespace gewebe {
+namespace gewebe::linalg {
 
 using namespace frontal;
 
@@ -21,7 +21,7 @@ constexpr std::array<std::array<std::size_t, 3>, 3> entry{{{0, 1, 2}, {1, 3, 4},
 
 } // namespace
 
-void FrontalFactor::State::assemble(const Source& k, const FrontAssembly& to) const {
+void FrontalFactor::State::assemble(const Source& k, const cholesky::FrontAssembly& to) const {
   const std::uint32_t first = tree.first[to.front], last = tree.first[to.front + 1];
   std::vector<SymmetricBlock> diagonals(last - first);
   if (k.model != nullptr)
@@ -41,7 +41,7 @@ void FrontalFactor::State::assemble(const Source& k, const FrontAssembly& to) co
   }
 }
 
-void FrontalFactor::State::add_blocks(const Source& k, const FrontAssembly& to,
+void FrontalFactor::State::add_blocks(const Source& k, const cholesky::FrontAssembly& to,
                                       std::vector<SymmetricBlock>& diagonals) const {
   const std::uint32_t first = tree.first[to.front], last = tree.first[to.front + 1];
   for (std::uint32_t at = first; at < last; ++at) {
@@ -62,9 +62,9 @@ void FrontalFactor::State::add_blocks(const Source& k, const FrontAssembly& to,
   }
 }
 
-void FrontalFactor::State::add_springs(const Source& k, const FrontAssembly& to,
+void FrontalFactor::State::add_springs(const Source& k, const cholesky::FrontAssembly& to,
                                        std::vector<SymmetricBlock>& diagonals) const {
-  const Model& model = *k.model;
+  const model::Model& model = *k.model;
   const std::uint32_t first = tree.first[to.front], last = tree.first[to.front + 1];
   const auto add_diagonal = [&](std::uint32_t place, const SymmetricBlock& block) {
     for (std::size_t n = 0; n < 6; ++n)
@@ -102,22 +102,23 @@ std::size_t FrontalFactor::State::axis_at(const Source& k, std::size_t f, std::s
 
 void FrontalFactor::State::factorise(const Source& k, std::span<const char> selected,
                                      const Context& context) {
-  const std::size_t size = measure_fronts(tree, graph.axes, fronts);
+  const std::size_t size = cholesky::measure_fronts(tree, graph.axes, fronts);
   require_memory(context,
                  8 * static_cast<double>(size) +
-                     update_bytes(tree, fronts, true, thread_count(context)),
+                     cholesky::update_bytes(tree, fronts, true, thread_count(context)),
                  "the factor of the stiffness matrix");
   memory.resize(tree.fronts());
   for (std::size_t f = 0; f < tree.fronts(); ++f)
     fronts[f].l = memory[f].reserve(fronts[f].entries(), true);
   try {
-    work = gewebe::factorise({.tree = tree,
-                              .axes = graph.axes,
-                              .fronts = fronts,
-                              .assemble = [&](const FrontAssembly& to) { assemble(k, to); },
-                              .keep_updates = true},
-                             selected, context);
-  } catch (const PivotTooSmall& pivot) {
+    work = gewebe::cholesky::factorise(
+        {.tree = tree,
+         .axes = graph.axes,
+         .fronts = fronts,
+         .assemble = [&](const cholesky::FrontAssembly& to) { assemble(k, to); },
+         .keep_updates = true},
+        selected, context);
+  } catch (const cholesky::PivotTooSmall& pivot) {
     throw NotPositiveDefinite(axis_at(k, pivot.front, pivot.column));
   }
   for (std::size_t f = 0; f < loads.size(); ++f)
@@ -137,10 +138,10 @@ void FrontalFactor::State::lay_out(const Source& k) {
     for (std::size_t a = 0; a < free.count; ++a)
       axis_of_row.push_back(3 * node + free.axis[a]);
   }
-  blocks = front_blocks(tree, graph.axes, fronts);
-  for (const Front& front : fronts) {
-    for (std::size_t c = 0; c < front.columns; c += front_block)
-      values.push_back(front.l + front_offset(front.rows, c));
+  blocks = cholesky::front_blocks(tree, graph.axes, fronts);
+  for (const cholesky::Front& front : fronts) {
+    for (std::size_t c = 0; c < front.columns; c += cholesky::front_block)
+      values.push_back(front.l + cholesky::front_offset(front.rows, c));
     entries += front.entries();
   }
   find_weakest();
@@ -195,21 +196,22 @@ void FrontalFactor::State::remember(const Source& k) {
 
 void FrontalFactor::State::begin(const Source& k, const Context& context) {
   const SpringGraph of = k.graph();
-  const std::vector<std::uint32_t> order = elimination_order(of.view());
+  const std::vector<std::uint32_t> order = cholesky::elimination_order(of.view());
   if (order.empty())
     throw Error("every node is fixed along every axis, expected a node that can move");
-  begin(k, front_tree(of.view(), order), context);
+  begin(k, cholesky::front_tree(of.view(), order), context);
 }
 
-void FrontalFactor::State::begin(const Source& k, FrontTree with, const Context& context) {
+void FrontalFactor::State::begin(const Source& k, cholesky::FrontTree with,
+                                 const Context& context) {
   cpu = context.cpu;
   graph = k.graph();
   tree = std::move(with);
-  fronts = std::vector<Front>(tree.fronts());
+  fronts = std::vector<cholesky::Front>(tree.fronts());
   loads.clear();
   factorise(k, {}, context);
   lay_out(k);
   remember(k);
 }
 
-} // namespace gewebe
+} // namespace gewebe::linalg

@@ -8,7 +8,7 @@
 #include <array>
 #include <numeric>
 
-namespace gewebe {
+namespace gewebe::linalg {
 
 using namespace frontal;
 
@@ -19,14 +19,14 @@ std::span<const std::int64_t> FrontalFactor::State::rows_of(std::size_t front) c
 
 void FrontalFactor::State::forward(std::size_t front, std::span<const std::int64_t> row,
                                    std::span<double> space) {
-  const Front& f = fronts[front];
+  const cholesky::Front& f = fronts[front];
   constexpr std::array<std::uint32_t, 1> only{0};
-  for (std::size_t c = 0; c < f.columns; c += front_block) {
+  for (std::size_t c = 0; c < f.columns; c += cholesky::front_block) {
     const auto first = static_cast<std::int64_t>(c);
-    const auto last = static_cast<std::int64_t>(std::min(c + front_block, f.columns));
+    const auto last = static_cast<std::int64_t>(std::min(c + cholesky::front_block, f.columns));
     const std::array<std::int64_t, 2> super{first, last},
         rows{first, static_cast<std::int64_t>(f.rows)};
-    const double* const block = f.l + front_offset(f.rows, c);
+    const double* const block = f.l + cholesky::front_offset(f.rows, c);
     const SupernodalArrays l{1, super.data(), rows.data(), nullptr, row.data(), nullptr, &block};
     forward_supernodal(cpu)(l, only, loads[front].values.data(), 1, space.data());
   }
@@ -46,7 +46,7 @@ std::size_t FrontalFactor::State::carry(std::span<const double> over_axes) {
   std::vector<double> own, space;
   std::size_t solved = 0;
   for (std::size_t f = 0; f < count; ++f) {
-    const Front& front = fronts[f];
+    const cholesky::Front& front = fronts[f];
     FrontLoad& load = loads[f];
     own.clear();
     for (std::size_t c = 0; c < front.columns; ++c)
@@ -79,4 +79,4 @@ std::size_t FrontalFactor::State::carry(std::span<const double> over_axes) {
   return solved;
 }
 
-} // namespace gewebe
+} // namespace gewebe::linalg

@@ -9,7 +9,7 @@
 #include <cstdint>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::linalg {
 
 struct NodeMatrix {
   std::vector<std::size_t> start{0};        ///< n + 1
@@ -21,7 +21,7 @@ struct NodeMatrix {
   std::vector<std::uint8_t> axes;           ///< by node: how many are free
 
   std::size_t nodes() const noexcept { return axes.size(); }
-  BlockGraph view() const noexcept { return {start, node, axes}; }
+  cholesky::BlockGraph view() const noexcept { return {start, node, axes}; }
 };
 
-} // namespace gewebe
+} // namespace gewebe::linalg

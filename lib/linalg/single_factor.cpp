@@ -7,7 +7,7 @@
 #include <array>
 #include <cmath>
 
-namespace gewebe {
+namespace gewebe::linalg {
 
 namespace {
 
@@ -167,9 +167,10 @@ void SingleFactor::solve(std::span<double> x, const Context& context) {
   for (std::size_t k = 0; k < x_.size(); ++k)
     x_[k] = static_cast<float>(x[permutation_[k]]);
   const auto together = [&](const std::vector<std::uint32_t>& level, const auto& work) {
-    if (level.size() > 1 && values_.size() >= worth_threads && thread_count(context) > 1)
-      parallel_blocks(context, level.size(), 1,
-                      [&](std::size_t n, std::size_t) { work(branches_[level[n]]); });
+    if (level.size() > 1 && values_.size() >= gewebe::linalg::worth_threads &&
+        gewebe::thread_count(context) > 1)
+      gewebe::parallel_blocks(context, level.size(), 1,
+                              [&](std::size_t n, std::size_t) { work(branches_[level[n]]); });
     else
       for (const std::uint32_t n : level)
         work(branches_[n]);
@@ -182,4 +183,4 @@ void SingleFactor::solve(std::span<double> x, const Context& context) {
     x[permutation_[k]] = static_cast<double>(x_[k]);
 }
 
-} // namespace gewebe
+} // namespace gewebe::linalg

@@ -16,7 +16,7 @@
 #include <span>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::linalg {
 
 /// A front's columns, in panels of eight, the last ones four: of each panel the rows below it,
 /// eight at a time, column by column, so that memory is read straight on. What fills them up is 0.
@@ -78,4 +78,4 @@ private:
   std::vector<float> x_;
 };
 
-} // namespace gewebe
+} // namespace gewebe::linalg

@@ -5,7 +5,7 @@
 #include "base/cpu.h"
 #include "linalg/single_factor.h"
 
-namespace gewebe {
+namespace gewebe::linalg {
 
 /// Of a front's rows, its own first, with SingleFront::step numbers behind them that are there to
 /// be read and written.
@@ -23,4 +23,4 @@ inline const SingleKernel& single_kernel(CpuLevel level) {
   return level == CpuLevel::baseline ? single_kernel_baseline : single_kernel_avx2;
 }
 
-} // namespace gewebe
+} // namespace gewebe::linalg

@@ -1,7 +1,7 @@
 #include "linalg/single_kernel_body_internal.h"
 
-namespace gewebe {
+namespace gewebe::linalg {
 
 const SingleKernel single_kernel_avx2{&forward, &backward};
 
-} // namespace gewebe
+} // namespace gewebe::linalg

@@ -10,7 +10,7 @@
 #include <immintrin.h>
 #endif
 
-namespace gewebe {
+namespace gewebe::linalg {
 namespace {
 
 using Eight = float __attribute__((vector_size(32), aligned(4), may_alias));
@@ -157,4 +157,4 @@ inline void backward(const SingleFront& f, float* rows) {
 }
 
 } // namespace
-} // namespace gewebe
+} // namespace gewebe::linalg

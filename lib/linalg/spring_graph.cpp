@@ -1,12 +1,12 @@
 #include "linalg/spring_graph.h"
 
-namespace gewebe {
+namespace gewebe::linalg {
 
-SpringGraph spring_graph(const Model& model) {
+SpringGraph spring_graph(const model::Model& model) {
   const std::size_t n = model.nodes.size();
   SpringGraph graph;
   graph.start.assign(n + 1, 0);
-  for (const Spring& s : model.springs)
+  for (const model::Spring& s : model.springs)
     if (s.stiffness != 0) {
       ++graph.start[s.i + std::size_t{1}];
       ++graph.start[s.j + std::size_t{1}];
@@ -17,7 +17,7 @@ SpringGraph spring_graph(const Model& model) {
   graph.spring.resize(graph.start[n]);
   std::vector<std::size_t> fill(graph.start.begin(), graph.start.end() - 1);
   for (std::uint32_t e = 0; e < model.springs.size(); ++e) {
-    const Spring& s = model.springs[e];
+    const model::Spring& s = model.springs[e];
     if (s.stiffness == 0)
       continue;
     graph.node[fill[s.i]] = s.j;
@@ -34,4 +34,4 @@ SpringGraph spring_graph(const Model& model) {
   return graph;
 }
 
-} // namespace gewebe
+} // namespace gewebe::linalg

@@ -8,7 +8,7 @@
 #include <cstdint>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::linalg {
 
 struct SpringGraph {
   std::vector<std::size_t> start;    ///< n + 1
@@ -16,10 +16,10 @@ struct SpringGraph {
   std::vector<std::uint32_t> spring; ///< of the model, that leads there
   std::vector<std::uint8_t> axes;    ///< n: how many axes of the node are free
 
-  BlockGraph view() const noexcept { return {start, node, axes}; }
+  cholesky::BlockGraph view() const noexcept { return {start, node, axes}; }
 };
 
 /// Springs of stiffness 0 are left out. \pre check_model(model) passes
-SpringGraph spring_graph(const Model& model);
+SpringGraph spring_graph(const model::Model& model);
 
-} // namespace gewebe
+} // namespace gewebe::linalg

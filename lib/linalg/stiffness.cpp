@@ -9,9 +9,9 @@
 // Based on: Bro-Nielsen, Finite Element Modeling in Surgery Simulation, 1998 (K u = f of the object
 // linearised at rest).
 
-namespace gewebe {
+namespace gewebe::linalg {
 
-SymmetricBlock stiffness_block(const Model& model, const Spring& s) {
+SymmetricBlock stiffness_block(const model::Model& model, const model::Spring& s) {
   const Vec3 d = model.nodes[s.j].position - model.nodes[s.i].position;
   const double l = norm(d);
   const Vec3 n = d / l;
@@ -35,10 +35,10 @@ struct Rows {
   std::vector<std::size_t> spring;
 };
 
-Rows rows_of(const Model& model) {
+Rows rows_of(const model::Model& model) {
   Rows rows;
   rows.start.resize(model.nodes.size() + 1);
-  for (const Spring& s : model.springs)
+  for (const model::Spring& s : model.springs)
     ++rows.start[s.i + std::size_t{1}];
   for (std::size_t i = 0; i < model.nodes.size(); ++i)
     rows.start[i + 1] += rows.start[i];
@@ -55,7 +55,8 @@ Rows rows_of(const Model& model) {
   return rows;
 }
 
-void number_axes(const Model& model, std::span<const std::uint8_t> fixed, StiffnessMatrix& matrix) {
+void number_axes(const model::Model& model, std::span<const std::uint8_t> fixed,
+                 StiffnessMatrix& matrix) {
   matrix.row_of_axis.assign(3 * model.nodes.size(), -1);
   for (std::size_t i = 0; i < model.nodes.size(); ++i)
     for (std::size_t a = 0; a < 3; ++a) {
@@ -73,7 +74,7 @@ namespace {
 
 /// \param left_out whether a spring makes no entry
 template <class LeftOut>
-StiffnessMatrix assemble(const Model& model, std::span<const Block> blocks,
+StiffnessMatrix assemble(const model::Model& model, std::span<const Block> blocks,
                          std::span<const double> added, std::span<const std::uint8_t> fixed,
                          LeftOut&& left_out) {
   StiffnessMatrix matrix;
@@ -83,7 +84,7 @@ StiffnessMatrix assemble(const Model& model, std::span<const Block> blocks,
 
   std::vector<Block> diagonal(model.nodes.size());
   for (std::size_t e = 0; e < model.springs.size(); ++e) {
-    const Spring& s = model.springs[e];
+    const model::Spring& s = model.springs[e];
     for (std::size_t k = 0; k < 6; ++k) {
       diagonal[s.i][k] += blocks[e][k];
       diagonal[s.j][k] += blocks[e][k];
@@ -129,23 +130,24 @@ StiffnessMatrix assemble(const Model& model, std::span<const Block> blocks,
 
 } // namespace
 
-StiffnessMatrix spring_stiffness(const Model& model, std::span<const std::uint8_t> fixed) {
+StiffnessMatrix spring_stiffness(const model::Model& model, std::span<const std::uint8_t> fixed) {
   std::vector<Block> blocks(model.springs.size());
   for (std::size_t e = 0; e < blocks.size(); ++e)
     blocks[e] = stiffness_block(model, model.springs[e]);
-  return assemble(model, blocks, {}, fixed, [](const Spring& s) { return s.stiffness == 0; });
+  return assemble(model, blocks, {}, fixed,
+                  [](const model::Spring& s) { return s.stiffness == 0; });
 }
 
-StiffnessMatrix spring_matrix(const Model& model, std::span<const SymmetricBlock> blocks,
+StiffnessMatrix spring_matrix(const model::Model& model, std::span<const SymmetricBlock> blocks,
                               std::span<const double> diagonal,
                               std::span<const std::uint8_t> fixed) {
   return assemble(model, blocks, diagonal, fixed,
-                  [](const Spring& s) { return s.stiffness == 0 && s.damping == 0; });
+                  [](const model::Spring& s) { return s.stiffness == 0 && s.damping == 0; });
 }
 
 namespace {
 
-void multiply_spring(const Spring& s, const SymmetricBlock& block, std::span<const double> u,
+void multiply_spring(const model::Spring& s, const SymmetricBlock& block, std::span<const double> u,
                      std::span<double> f) {
   const std::size_t i = 3 * std::size_t{s.i}, j = 3 * std::size_t{s.j};
   const std::array<double, 3> stretch{u[i] - u[j], u[i + 1] - u[j + 1], u[i + 2] - u[j + 2]};
@@ -159,15 +161,15 @@ void multiply_spring(const Spring& s, const SymmetricBlock& block, std::span<con
 
 } // namespace
 
-std::vector<SymmetricBlock> stiffness_blocks(const Model& model) {
+std::vector<SymmetricBlock> stiffness_blocks(const model::Model& model) {
   std::vector<SymmetricBlock> blocks;
   blocks.reserve(model.springs.size());
-  for (const Spring& s : model.springs)
+  for (const model::Spring& s : model.springs)
     blocks.push_back(stiffness_block(model, s));
   return blocks;
 }
 
-void multiply_springs(const Model& model, std::span<const SymmetricBlock> blocks,
+void multiply_springs(const model::Model& model, std::span<const SymmetricBlock> blocks,
                       std::span<const double> u, std::span<double> f) {
   std::fill(f.begin(), f.end(), 0.0);
   for (std::size_t k = 0; k < blocks.size(); ++k)
@@ -202,4 +204,4 @@ void multiply(const StiffnessMatrix& matrix, std::span<const double> x, std::spa
   }
 }
 
-} // namespace gewebe
+} // namespace gewebe::linalg

@@ -16,7 +16,7 @@
 #include <span>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::linalg {
 
 /// The lower triangle of K on free axes, by columns, rows ascending, the diagonal always present,
 /// springs of stiffness 0 left out.
@@ -33,27 +33,28 @@ struct StiffnessMatrix {
 /// K of the model's springs. `fixed` (empty, or 3 n flags) names further axes to leave out, as
 /// where displacements are prescribed. The same bytes on every machine. \pre check_model(model)
 /// passes \throw Error if no axis is free, or a sum isn't finite
-StiffnessMatrix spring_stiffness(const Model& model, std::span<const std::uint8_t> fixed = {});
+StiffnessMatrix spring_stiffness(const model::Model& model,
+                                 std::span<const std::uint8_t> fixed = {});
 
 /// A symmetric 3 × 3 matrix, entries xx xy xz yy yz zz.
 using SymmetricBlock = std::array<double, 6>;
 
 /// What a spring of the model adds to K.
-SymmetricBlock stiffness_block(const Model& model, const Spring& spring);
+SymmetricBlock stiffness_block(const model::Model& model, const model::Spring& spring);
 
 /// The sum over the springs of blocks[e] at (i,i) and (j,j) and its negative at (i,j) and (j,i),
 /// plus diagonal[i] (where there is one) on the axes of node i. Springs without stiffness and
 /// damping make no entry, so that models of one structure have matrices of one pattern. \pre a
 /// block for each spring   \throw Error as spring_stiffness
-StiffnessMatrix spring_matrix(const Model& model, std::span<const SymmetricBlock> blocks,
+StiffnessMatrix spring_matrix(const model::Model& model, std::span<const SymmetricBlock> blocks,
                               std::span<const double> diagonal,
                               std::span<const std::uint8_t> fixed = {});
 
 /// What each spring adds to K.
-std::vector<SymmetricBlock> stiffness_blocks(const Model& model);
+std::vector<SymmetricBlock> stiffness_blocks(const model::Model& model);
 /// f = K u of the springs over all 3 n axes, the fixed ones too. \pre blocks are those of the
 /// model, u.size() == f.size() == 3 n
-void multiply_springs(const Model& model, std::span<const SymmetricBlock> blocks,
+void multiply_springs(const model::Model& model, std::span<const SymmetricBlock> blocks,
                       std::span<const double> u, std::span<double> f);
 
 /// y = K x. \pre x.size() == y.size() == matrix.order(), they don't overlap
@@ -62,4 +63,4 @@ void multiply(const StiffnessMatrix& matrix, std::span<const double> x, std::spa
 /// ‖K‖∞ (= ‖K‖₁) of the matrix.
 double stiffness_norm(const StiffnessMatrix& matrix);
 
-} // namespace gewebe
+} // namespace gewebe::linalg

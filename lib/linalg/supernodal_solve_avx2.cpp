@@ -1,6 +1,6 @@
 #include "linalg/supernodal_solve_kernel_internal.h"
 
-namespace gewebe {
+namespace gewebe::linalg {
 
 void solve_supernodal_avx2(const SupernodalArrays& l, double* x, std::size_t vectors,
                            double* work) {
@@ -17,4 +17,4 @@ void solve_reached_avx2(const SupernodalArrays& l, std::span<const std::uint32_t
   reached_any(l, reached, x, vectors, work);
 }
 
-} // namespace gewebe
+} // namespace gewebe::linalg

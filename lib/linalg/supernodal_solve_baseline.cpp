@@ -1,6 +1,6 @@
 #include "linalg/supernodal_solve_kernel_internal.h"
 
-namespace gewebe {
+namespace gewebe::linalg {
 
 void solve_supernodal_baseline(const SupernodalArrays& l, double* x, std::size_t vectors,
                                double* work) {
@@ -18,4 +18,4 @@ void solve_reached_baseline(const SupernodalArrays& l, std::span<const std::uint
   reached_any(l, reached, x, vectors, work);
 }
 
-} // namespace gewebe
+} // namespace gewebe::linalg

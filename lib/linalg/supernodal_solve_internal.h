@@ -9,7 +9,7 @@
 #include <cstdint>
 #include <span>
 
-namespace gewebe {
+namespace gewebe::linalg {
 
 /// L as in cholmod_factor: supernode k has columns super[k] … super[k+1]-1, rows s[pi[k] …
 /// pi[k+1]-1], its own columns first, and values x[px[k] …], column by column; or, where those are
@@ -89,4 +89,4 @@ inline SolveReached solve_reached(CpuLevel cpu) {
                                    : solve_reached_avx512;
 }
 
-} // namespace gewebe
+} // namespace gewebe::linalg

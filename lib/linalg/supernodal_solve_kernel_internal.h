@@ -9,7 +9,7 @@
 #include <type_traits>
 #include <utility>
 
-namespace gewebe {
+namespace gewebe::linalg {
 namespace {
 
 #if defined(__AVX512F__)
@@ -427,4 +427,4 @@ inline void forward_any(const SupernodalArrays& l, std::span<const std::uint32_t
 }
 
 } // namespace
-} // namespace gewebe
+} // namespace gewebe::linalg

@@ -8,7 +8,7 @@
 #include <numeric>
 #include <tuple>
 
-namespace gewebe {
+namespace gewebe::mesh {
 namespace {
 
 using Edge = std::array<std::uint32_t, 2>;
@@ -175,4 +175,4 @@ void close_with_cones(const std::vector<Edge>& edges, std::vector<Vec3>& points,
     triangles.push_back({edges[e][0], edges[e][1], first_apex + group[e]});
 }
 
-} // namespace gewebe
+} // namespace gewebe::mesh

@@ -10,7 +10,7 @@
 #include <span>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::mesh {
 
 /// Edges in which an odd number of triangles meet, each {smaller, larger} point index, ascending.
 /// Points at equal position count as one (the smallest index stands for them). Empty: every ray in
@@ -43,4 +43,4 @@ std::uint32_t edge_groups(const std::vector<std::array<std::uint32_t, 2>>& edges
 void close_with_cones(const std::vector<std::array<std::uint32_t, 2>>& edges,
                       std::vector<Vec3>& points, std::vector<Triangle>& triangles);
 
-} // namespace gewebe
+} // namespace gewebe::mesh

@@ -14,7 +14,7 @@
 #include <utility>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::mesh {
 namespace {
 
 constexpr std::size_t grain = 1 << 15;
@@ -186,4 +186,4 @@ MeshReport examine_mesh(const TriangleMesh& mesh, const Context& context, MeshQu
   return report;
 }
 
-} // namespace gewebe
+} // namespace gewebe::mesh

@@ -7,7 +7,7 @@
 
 #include <cstdint>
 
-namespace gewebe {
+namespace gewebe::mesh {
 
 /// Counts over the topology (indices) and the geometry of a mesh. Edges join two different points;
 /// faces with equal corners are counted as `degenerate_faces` and take no part in anything else.
@@ -53,4 +53,4 @@ struct MeshReport {
 MeshReport examine_mesh(const TriangleMesh& mesh, const Context& context = {},
                         MeshQuality* quality = nullptr);
 
-} // namespace gewebe
+} // namespace gewebe::mesh

@@ -7,7 +7,7 @@
 #include <cstddef>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::mesh {
 namespace {
 
 /// The component of each point, by the number of its first point.
@@ -102,4 +102,4 @@ ComponentReport keep_components(TriangleMesh& mesh, const ComponentChoice& choic
   return report;
 }
 
-} // namespace gewebe
+} // namespace gewebe::mesh

@@ -5,7 +5,7 @@
 
 #include <cstdint>
 
-namespace gewebe {
+namespace gewebe::mesh {
 
 /// Which components stay: of those with at least `min_volume` mm³ the `largest` ones.
 struct ComponentChoice {
@@ -35,4 +35,4 @@ Topology topology(const TriangleMesh& mesh);
 /// arrays' entries with their points and faces. \pre check_mesh(mesh) passes
 ComponentReport keep_components(TriangleMesh& mesh, const ComponentChoice& choice);
 
-} // namespace gewebe
+} // namespace gewebe::mesh

@@ -9,7 +9,7 @@
 #include <cstdint>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::mesh {
 
 /// A surface whose triangles that met the other one have been split. Points and triangles before
 /// keep their numbers; of a triangle before the first part does.
@@ -42,4 +42,4 @@ public:
 /// \throw MeetingOfNoSheets; before any work where edges of one lie on each other near the other
 SurfaceCrossing cross_surfaces(const TriangleMesh& a, const TriangleMesh& b);
 
-} // namespace gewebe
+} // namespace gewebe::mesh

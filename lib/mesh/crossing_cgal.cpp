@@ -16,7 +16,7 @@
 #include <utility>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::mesh {
 namespace {
 
 namespace pmp = CGAL::Polygon_mesh_processing;
@@ -218,4 +218,4 @@ SurfaceCrossing cross_surfaces(const TriangleMesh& a, const TriangleMesh& b) {
   return crossing;
 }
 
-} // namespace gewebe
+} // namespace gewebe::mesh

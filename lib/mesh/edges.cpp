@@ -9,7 +9,7 @@
 #include <string>
 #include <utility>
 
-namespace gewebe {
+namespace gewebe::mesh {
 
 namespace {
 
@@ -56,14 +56,15 @@ EdgeSides::EdgeSides(std::size_t points, std::span<const Triangle> triangles,
   const Context quiet = without_progress(context);
   const FaceRanges ranges(triangles, points, quiet);
   const auto each_range = [&](const auto& body) {
-    parallel_blocks(quiet, points, ranges.grain(), body);
+    gewebe::parallel_blocks(quiet, points, ranges.grain(), body);
   };
   const auto each_side = [&](std::size_t begin, std::size_t end, const auto& visit) {
     ranges.for_each_block(begin, end, [&](std::size_t first, std::size_t stop, bool whole) {
-      for_each_side(triangles, first, stop, [&](std::uint32_t low, const EdgeSide& side) {
-        if (whole || (low >= begin && low < end))
-          visit(low, side);
-      });
+      gewebe::mesh::for_each_side(triangles, first, stop,
+                                  [&](std::uint32_t low, const gewebe::mesh::EdgeSide& side) {
+                                    if (whole || (low >= begin && low < end))
+                                      visit(low, side);
+                                  });
     });
   };
   each_range([&](std::size_t begin, std::size_t end) {
@@ -149,4 +150,4 @@ std::size_t EdgeTable::find(const std::array<std::uint32_t, 2>& wanted) const {
   return at != ends.end() && *at == wanted ? static_cast<std::size_t>(at - ends.begin()) : no_edge;
 }
 
-} // namespace gewebe
+} // namespace gewebe::mesh

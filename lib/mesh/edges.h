@@ -12,7 +12,7 @@
 #include <span>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::mesh {
 
 /// Such a face has no area. It has no edges in the tables below, for its sides cancel.
 inline bool has_equal_corners(const Triangle& t) {
@@ -125,4 +125,4 @@ EdgeTable edge_table(std::span<const Triangle> triangles, std::size_t point_coun
 EdgeTable edge_table(std::span<const Triangle> triangles, std::size_t point_count,
                      const Context& context);
 
-} // namespace gewebe
+} // namespace gewebe::mesh

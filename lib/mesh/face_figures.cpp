@@ -7,7 +7,7 @@
 #include <algorithm>
 #include <cmath>
 
-namespace gewebe {
+namespace gewebe::mesh {
 namespace {
 
 constexpr double degrees = 57.295779513082320877;
@@ -231,4 +231,4 @@ Histogram histogram(std::span<const std::span<const float>> pieces, std::size_t 
   return result;
 }
 
-} // namespace gewebe
+} // namespace gewebe::mesh

@@ -10,7 +10,7 @@
 #include <span>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::mesh {
 
 /// Counts of values in equal bins over [0, top]; a value at a border counts above it, one at the
 /// top in the last bin.
@@ -52,4 +52,4 @@ struct FaceFigures {
 FaceFigures examine_faces(const TriangleMesh& mesh, const std::vector<std::uint32_t>& component,
                           const Context& context);
 
-} // namespace gewebe
+} // namespace gewebe::mesh

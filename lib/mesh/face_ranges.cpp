@@ -2,7 +2,7 @@
 
 #include "base/parallel.h"
 
-namespace gewebe {
+namespace gewebe::mesh {
 
 FaceRanges::FaceRanges(std::span<const Triangle> triangles, std::size_t points,
                        const Context& context)
@@ -26,4 +26,4 @@ FaceRanges::FaceRanges(std::span<const Triangle> triangles, std::size_t points,
   }
 }
 
-} // namespace gewebe
+} // namespace gewebe::mesh

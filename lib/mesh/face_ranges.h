@@ -12,7 +12,7 @@
 #include <span>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::mesh {
 
 /// Keeps the triangles' span, and looks at it once to begin with.
 class FaceRanges {
@@ -49,4 +49,4 @@ private:
   std::size_t grain_ = 4 * faces_of_block;
 };
 
-} // namespace gewebe
+} // namespace gewebe::mesh

@@ -14,7 +14,7 @@
 #include <string>
 #include <utility>
 
-namespace gewebe {
+namespace gewebe::mesh {
 
 namespace {
 
@@ -36,7 +36,7 @@ public:
         const auto within = [&](std::uint32_t p) { return whole || (p >= begin && p < end); };
         for (std::size_t f = first; f < stop; ++f) {
           const auto [a, b, c] = triangles[f];
-          if (has_equal_corners(triangles[f]))
+          if (gewebe::mesh::has_equal_corners(triangles[f]))
             continue;
           if (within(a))
             use(a - begin, b, c);
@@ -289,4 +289,4 @@ FanFigures examine_fans(const TriangleMesh& mesh, const Context& context) {
   return sum;
 }
 
-} // namespace gewebe
+} // namespace gewebe::mesh

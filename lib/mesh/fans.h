@@ -8,7 +8,7 @@
 #include <cstdint>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::mesh {
 
 /// Sums over the fans of all points; what they mean is said in mesh/check.h and mesh/quality.h.
 struct FanFigures {
@@ -28,4 +28,4 @@ struct FanFigures {
 /// \pre check_mesh(mesh) passes   \throw Error if there are more than 2^32 / 3 triangles; Cancelled
 FanFigures examine_fans(const TriangleMesh& mesh, const Context& context);
 
-} // namespace gewebe
+} // namespace gewebe::mesh

@@ -1,6 +1,6 @@
 #include "mesh/nearest_point.h"
 
-namespace gewebe {
+namespace gewebe::mesh {
 
 NearestPoint nearest_on_triangle(const Vec3& p, const Vec3& a, const Vec3& b, const Vec3& c) {
   const Vec3 ab = b - a, ac = c - a, ap = p - a;
@@ -28,4 +28,4 @@ NearestPoint nearest_on_triangle(const Vec3& p, const Vec3& a, const Vec3& b, co
   return {a + ab * (vb / sum) + ac * (vc / sum), 0};
 }
 
-} // namespace gewebe
+} // namespace gewebe::mesh

@@ -3,7 +3,7 @@
 
 #include "geometry/vec3.h"
 
-namespace gewebe {
+namespace gewebe::mesh {
 
 /// Where on a triangle the point nearest to another lies.
 struct NearestPoint {
@@ -16,4 +16,4 @@ struct NearestPoint {
 /// After C. Ericson, Real-Time Collision Detection, 2005, section 5.1.5.
 NearestPoint nearest_on_triangle(const Vec3& p, const Vec3& a, const Vec3& b, const Vec3& c);
 
-} // namespace gewebe
+} // namespace gewebe::mesh

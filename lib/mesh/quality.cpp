@@ -8,7 +8,7 @@
 // Based on: Gershgorin's circle theorem for the springs' stiffness matrix, whose off-diagonal
 // blocks have the norm of their springs' stiffness.
 
-namespace gewebe {
+namespace gewebe::mesh {
 namespace {
 
 constexpr std::size_t grain = 1 << 15;
@@ -46,4 +46,4 @@ MeshQuality mesh_quality(const TriangleMesh& mesh, const Context& context) {
   return quality;
 }
 
-} // namespace gewebe
+} // namespace gewebe::mesh

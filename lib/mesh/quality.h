@@ -7,7 +7,7 @@
 #include "mesh/face_figures.h"
 #include "mesh/fans.h"
 
-namespace gewebe {
+namespace gewebe::mesh {
 
 struct MeshQuality {
   Histogram smallest_angles; ///< of each face, degrees: 12 bins of 5
@@ -32,4 +32,4 @@ MeshQuality quality_of(const FaceFigures& faces, const FanFigures& fans, const C
 /// What examine_mesh (mesh/check.h) finds, faces with equal corners left out. \pre, \throw as there
 MeshQuality mesh_quality(const TriangleMesh& mesh, const Context& context = {});
 
-} // namespace gewebe
+} // namespace gewebe::mesh

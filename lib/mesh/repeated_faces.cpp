@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <tuple>
 
-namespace gewebe {
+namespace gewebe::mesh {
 
 namespace {
 
@@ -53,4 +53,4 @@ std::vector<bool> repeated_faces(std::size_t points, std::span<const Triangle> t
   return repeated;
 }
 
-} // namespace gewebe
+} // namespace gewebe::mesh

@@ -8,7 +8,7 @@
 #include <span>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::mesh {
 
 /// Which faces count as the same one.
 enum class SameFace {
@@ -23,4 +23,4 @@ enum class SameFace {
 std::vector<bool> repeated_faces(std::size_t points, std::span<const Triangle> triangles,
                                  SameFace same, std::span<const std::int32_t> part = {});
 
-} // namespace gewebe
+} // namespace gewebe::mesh

@@ -11,7 +11,7 @@
 #include <cstddef>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::mesh {
 namespace {
 
 using Corners = std::array<Vec3, 3>;
@@ -162,4 +162,4 @@ SelfIntersections self_intersections(const Context& context, const TriangleMesh&
   return result;
 }
 
-} // namespace gewebe
+} // namespace gewebe::mesh

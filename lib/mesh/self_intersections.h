@@ -9,7 +9,7 @@
 #include <cstdint>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::mesh {
 
 struct SelfIntersections {
   std::uint64_t pairs = 0;            ///< of faces that meet in more than what they share
@@ -38,4 +38,4 @@ private:
   double scale_ = 1;
 };
 
-} // namespace gewebe
+} // namespace gewebe::mesh

@@ -7,7 +7,7 @@
 #include <numeric>
 #include <utility>
 
-namespace gewebe {
+namespace gewebe::mesh {
 
 namespace {
 
@@ -155,4 +155,4 @@ HalfEdges half_edges(std::size_t points, std::span<const Triangle> triangles) {
   return out;
 }
 
-} // namespace gewebe
+} // namespace gewebe::mesh

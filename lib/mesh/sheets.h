@@ -11,7 +11,7 @@
 #include <span>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::mesh {
 
 /// Each edge is of one face, or of two that run along it in opposite directions, and the faces at
 /// each point hang together by such edges.
@@ -44,4 +44,4 @@ struct HalfEdges {
 /// \pre the triangles are sheets (see there)
 HalfEdges half_edges(std::size_t points, std::span<const Triangle> triangles);
 
-} // namespace gewebe
+} // namespace gewebe::mesh

@@ -7,7 +7,7 @@
 // Based on: Sutherland, Sproull, Schumacker, A characterization of ten hidden-surface algorithms
 // (Newell's normal), 1974.
 
-namespace gewebe {
+namespace gewebe::mesh {
 namespace {
 
 struct Point2 {
@@ -146,4 +146,4 @@ void triangulate_polygon(std::span<const Vec3> polygon, std::vector<Triangle>& o
   clipper.clip(out);
 }
 
-} // namespace gewebe
+} // namespace gewebe::mesh

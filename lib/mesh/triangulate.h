@@ -7,7 +7,7 @@
 #include <span>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::mesh {
 
 /// Corners that `triangulate_polygon` takes at most: its work grows with the square of the reflex
 /// ones.
@@ -22,4 +22,4 @@ inline constexpr std::size_t max_polygon_corners = 10000;
 /// max_polygon_corners
 void triangulate_polygon(std::span<const Vec3> polygon, std::vector<Triangle>& out);
 
-} // namespace gewebe
+} // namespace gewebe::mesh

@@ -19,7 +19,7 @@
 // Based on: Van Gelder, Approximate Simulation of Elastic Membranes by Triangulated Spring Meshes,
 // 1998.
 
-namespace gewebe {
+namespace gewebe::model {
 
 namespace {
 
@@ -127,7 +127,7 @@ private:
         share[t] = m.density * m.thickness * (norm(area_vector_[t]) / 3);
       }
     });
-    const FaceRanges ranges(surface_.triangles, model_.nodes.size(), context_);
+    const mesh::FaceRanges ranges(surface_.triangles, model_.nodes.size(), context_);
     parallel_blocks(
         context_, model_.nodes.size(), ranges.grain(), [&](std::size_t begin, std::size_t end) {
           for (std::size_t i = begin; i < end; ++i) {
@@ -205,7 +205,7 @@ private:
   }
 
   void edge_springs() {
-    const EdgeTable& edges = surface_.edges;
+    const mesh::EdgeTable& edges = surface_.edges;
     std::vector<Spring>& springs = model_.springs;
     springs.reserve((options_.bend ? 2 : 1) * edges.size() +
                     (options_.centrals > 0 ? model_.nodes.size() : 0));
@@ -231,7 +231,7 @@ private:
   }
 
   void bending_springs() {
-    const EdgeTable& edges = surface_.edges;
+    const mesh::EdgeTable& edges = surface_.edges;
     using Across = std::array<std::uint32_t, 3>; // node, node, edge between
     std::vector<Across> across;
     for (std::uint32_t e = 0; e < edges.size(); ++e) {
@@ -409,7 +409,7 @@ private:
         context_, model_.texcoords.size(), 4096, [&](std::size_t begin, std::size_t end) {
           for (std::size_t t = begin; t < end; ++t) {
             const auto& from = mesh_.texcoords[surface_.face_of_triangle[t]];
-            std::transform(from.begin(), from.end(), model_.texcoords[t].begin(), decimal_of);
+            std::transform(from.begin(), from.end(), model_.texcoords[t].begin(), text::decimal_of);
           }
         });
   }
@@ -454,4 +454,4 @@ BuiltModel build_model(const TriangleMesh& mesh, const BuildOptions& options,
   return Builder(mesh, options, context).build();
 }
 
-} // namespace gewebe
+} // namespace gewebe::model

@@ -13,7 +13,7 @@
 #include <string>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::model {
 
 struct BuildOptions {
   MaterialChoice material{{material_presets()[0]}, {}};
@@ -95,4 +95,4 @@ Clusters cluster_points(const std::vector<Vec3>& points, std::size_t count, cons
 Clusters nearest_clusters(const std::vector<Vec3>& points, const std::vector<Vec3>& centers,
                           const Context& context);
 
-} // namespace gewebe
+} // namespace gewebe::model

@@ -8,25 +8,26 @@
 #include <string>
 #include <tuple>
 
-namespace gewebe {
+namespace gewebe::model {
 
 namespace {
 
 void require_not_negative(double value, const char* what) {
   if (!(value >= 0 && std::isfinite(value)))
-    throw Error(std::string(what) + " is " + number_text(value) +
+    throw Error(std::string(what) + " is " + text::number_text(value) +
                 ", expected a finite number, 0 or more");
 }
 
 void require_positive(double value, const char* what) {
   if (!(value > 0 && std::isfinite(value)))
-    throw Error(std::string(what) + " is " + number_text(value) +
+    throw Error(std::string(what) + " is " + text::number_text(value) +
                 ", expected a finite number above 0");
 }
 
 void require_finite(double value, const char* what) {
   if (!std::isfinite(value))
-    throw Error(std::string(what) + " is " + number_text(value) + ", expected a finite number");
+    throw Error(std::string(what) + " is " + text::number_text(value) +
+                ", expected a finite number");
 }
 
 std::string pair(const Spring& s) {
@@ -57,7 +58,8 @@ void ModelChecker::material(std::size_t i) const {
   require_positive(m.thickness, "thickness");
   require_not_negative(m.damping_ratio, "damping ratio");
   if (m.poisson && !(*m.poisson >= 0 && *m.poisson < 0.5))
-    throw Error("Poisson's ratio is " + number_text(*m.poisson) + ", expected 0 to below 0.5");
+    throw Error("Poisson's ratio is " + text::number_text(*m.poisson) +
+                ", expected 0 to below 0.5");
   if (m.law && !m.poisson)
     throw Error("a law without a Poisson's ratio, expected both");
   if (m.law)
@@ -256,4 +258,4 @@ void ModelChecker::require_material(std::int32_t material) const {
                 std::to_string(model_.materials.size() - 1));
 }
 
-} // namespace gewebe
+} // namespace gewebe::model

@@ -10,7 +10,7 @@
 #include <string>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::model {
 
 /// \throw Error if a model or a material can't have this name
 void check_name(const std::string& name);
@@ -56,4 +56,4 @@ private:
   std::size_t merge_ = 0;         ///< see spring()
 };
 
-} // namespace gewebe
+} // namespace gewebe::model

@@ -11,7 +11,7 @@
 // Lloyd, Least Squares Quantization in PCM, 1982.
 // Hamerly, Making k-means even faster, 2010 (a bound on the distance of all other centers).
 
-namespace gewebe {
+namespace gewebe::model {
 
 namespace {
 
@@ -196,4 +196,4 @@ Clusters cluster_points(const std::vector<Vec3>& points, std::size_t count, cons
   return clusters;
 }
 
-} // namespace gewebe
+} // namespace gewebe::model

@@ -2,7 +2,7 @@
 
 #include "mesh/edges.h"
 
-namespace gewebe {
+namespace gewebe::model {
 
 std::vector<std::pair<const char*, std::uint64_t>> model_counts(const Model& model,
                                                                 const Context& context) {
@@ -10,8 +10,8 @@ std::vector<std::pair<const char*, std::uint64_t>> model_counts(const Model& mod
   std::uint64_t fixed = 0, boundary = 0;
   for (std::size_t i = 0; i < bodies; ++i)
     fixed += model.nodes[i].fixed != fixed_none ? 1 : 0;
-  EdgeSides(model.nodes.size(), model.triangles, context)
-      .for_each_edge([&](std::uint32_t, std::span<const EdgeSide> edge) {
+  mesh::EdgeSides(model.nodes.size(), model.triangles, context)
+      .for_each_edge([&](std::uint32_t, std::span<const mesh::EdgeSide> edge) {
         boundary += edge.size() == 1 ? 1 : 0;
       });
   std::vector<std::pair<const char*, std::uint64_t>> counts = {
@@ -34,4 +34,4 @@ std::vector<std::pair<const char*, std::uint64_t>> model_counts(const Model& mod
   return counts;
 }
 
-} // namespace gewebe
+} // namespace gewebe::model

@@ -8,7 +8,7 @@
 #include <utility>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::model {
 
 /// Names and counts: nodes (of the surface), centrals, springs_e, springs_b, springs_c, triangles,
 /// components, boundary_edges (of exactly one triangle), fixed_nodes (of the surface, along an axis
@@ -16,4 +16,4 @@ namespace gewebe {
 std::vector<std::pair<const char*, std::uint64_t>> model_counts(const Model& model,
                                                                 const Context& context);
 
-} // namespace gewebe
+} // namespace gewebe::model

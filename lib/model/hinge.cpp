@@ -4,7 +4,7 @@
 #include <cmath>
 #include <utility>
 
-namespace gewebe {
+namespace gewebe::model {
 
 namespace {
 
@@ -92,4 +92,4 @@ std::vector<Hinged> hinged_components(const Model& model) {
   return hinged;
 }
 
-} // namespace gewebe
+} // namespace gewebe::model

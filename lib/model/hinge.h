@@ -7,7 +7,7 @@
 #include <cstdint>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::model {
 
 /// A component with some rigid motions held and some free.
 struct Hinged {
@@ -22,4 +22,4 @@ struct Hinged {
 /// \pre check_model(model) passes
 std::vector<Hinged> hinged_components(const Model& model);
 
-} // namespace gewebe
+} // namespace gewebe::model

@@ -10,7 +10,7 @@
 #include <system_error>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::model {
 
 namespace {
 
@@ -109,7 +109,7 @@ std::string law_text(const HyperelasticLaw& law) {
   const std::span<const Parameter> parameters = parameters_of(law.kind);
   for (std::size_t k = 0; k < parameters.size(); ++k)
     if (law.parameter[k] != 0) {
-      text += before + std::string(parameters[k].name) + '=' + number_text(law.parameter[k]);
+      text += before + std::string(parameters[k].name) + '=' + text::number_text(law.parameter[k]);
       before = ',';
     }
   return text;
@@ -120,9 +120,9 @@ void check_law(const HyperelasticLaw& law) {
   for (std::size_t k = 0; k < parameters.size(); ++k) {
     const Parameter& p = parameters[k];
     const double value = law.parameter[k], size = std::abs(value);
-    const std::string most = number_text(p.most), least = number_text(p.least);
+    const std::string most = text::number_text(p.most), least = text::number_text(p.least);
     if (!(size <= p.most && (size >= p.least || size == 0)))
-      throw Error(std::string(p.name) + " of " + number_text(value) +
+      throw Error(std::string(p.name) + " of " + text::number_text(value) +
                   " is out of range, expected " +
                   (p.least == 0 ? "-" + most + " to " + most
                                 : least + " to " + most + " or -" + most + " to -" + least));
@@ -135,4 +135,4 @@ void check_law(const HyperelasticLaw& law) {
     throw Error("ogden with only one of alpha2 and mu2, expected both or none");
 }
 
-} // namespace gewebe
+} // namespace gewebe::model

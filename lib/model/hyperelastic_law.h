@@ -10,7 +10,7 @@
 #include <string>
 #include <string_view>
 
-namespace gewebe {
+namespace gewebe::model {
 
 struct HyperelasticLaw {
   enum Kind : std::uint8_t { stable_neo_hookean, neo_hookean, mooney_rivlin, yeoh, ogden };
@@ -41,4 +41,4 @@ std::string law_text(const HyperelasticLaw& law);
 /// -1000 to 1000, alphas from 0.1 to 50 or from -50 to -0.1, mu2 from -10 to 10
 void check_law(const HyperelasticLaw& law);
 
-} // namespace gewebe
+} // namespace gewebe::model

@@ -7,7 +7,7 @@
 #include <cmath>
 #include <cstddef>
 
-namespace gewebe {
+namespace gewebe::model {
 
 namespace {
 
@@ -26,7 +26,7 @@ LogSecondDerivative second_derivative(const HyperelasticLaw& law, const Stretche
   // Sums of powers: c (s_1^a + s_2^a + s_3^a) has c a² s_i^a.
   const auto add = [&](double factor, double alpha) {
     for (std::size_t i = 0; i < 3; ++i)
-      h.d[i] += factor * power(s[i], alpha);
+      h.d[i] += factor * numeric::power(s[i], alpha);
   };
   if (law.kind == HyperelasticLaw::yeoh) {
     const double x = s[0] * s[0] + s[1] * s[1] + s[2] * s[2] - 3;
@@ -68,7 +68,7 @@ constexpr std::array<Path, 3> paths{{{"uniaxial tension", "uniaxial compression"
 bool is_stable(const HyperelasticLaw& law, const Path& path, double stretch) {
   Stretches s{};
   for (std::size_t i = 0; i < 3; ++i)
-    s[i] = power(stretch, path.powers[i]);
+    s[i] = numeric::power(stretch, path.powers[i]);
   return is_stable(law, s);
 }
 
@@ -90,7 +90,7 @@ double stable_until(const HyperelasticLaw& law, const Path& path, double end) {
 }
 
 std::string percent(double value) {
-  return number_text(std::round(value * 1000) / 10) + " %";
+  return text::number_text(std::round(value * 1000) / 10) + " %";
 }
 
 } // namespace
@@ -117,4 +117,4 @@ std::string instability_text(const HyperelasticLaw& law) {
   return text;
 }
 
-} // namespace gewebe
+} // namespace gewebe::model

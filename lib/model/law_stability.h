@@ -7,7 +7,7 @@
 #include <string_view>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::model {
 
 /// Where a law stops being stable on one path.
 struct LawInstability {
@@ -27,4 +27,4 @@ std::vector<LawInstability> law_instabilities(const HyperelasticLaw& law);
 /// "uniaxial tension beyond a strain of 35.2 %, ..."; empty where the law is stable.
 std::string instability_text(const HyperelasticLaw& law);
 
-} // namespace gewebe
+} // namespace gewebe::model

@@ -7,7 +7,7 @@
 #include <charconv>
 #include <optional>
 
-namespace gewebe {
+namespace gewebe::model {
 
 const std::vector<Material>& material_presets() {
   static const std::vector<Material> presets = parse_material_table(preset_table(), "presets");
@@ -154,4 +154,4 @@ MaterialChoice parse_material_choice(std::string_view text, const std::vector<Ma
   }
 }
 
-} // namespace gewebe
+} // namespace gewebe::model

@@ -11,7 +11,7 @@
 #include <utility>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::model {
 
 /// The presets: generic, liver, gallbladder, uterus.
 const std::vector<Material>& material_presets();
@@ -56,4 +56,4 @@ void override_materials(std::vector<Material>& materials, const MaterialOverride
 MaterialChoice parse_material_choice(std::string_view text,
                                      const std::vector<Material>& table = material_presets());
 
-} // namespace gewebe
+} // namespace gewebe::model

@@ -8,7 +8,7 @@
 #include <cmath>
 #include <cstddef>
 
-namespace gewebe {
+namespace gewebe::model {
 
 namespace {
 
@@ -187,4 +187,4 @@ std::string merged_tables(std::string_view table, std::string_view more) {
   return text += more;
 }
 
-} // namespace gewebe
+} // namespace gewebe::model

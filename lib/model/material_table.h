@@ -8,7 +8,7 @@
 #include <string_view>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::model {
 
 /// The table of the presets, with where their numbers come from.
 std::string_view preset_table();
@@ -24,4 +24,4 @@ std::vector<Material> parse_material_table(std::string_view text, const std::str
 /// the materials that `more` has too. \pre both parse
 std::string merged_tables(std::string_view table, std::string_view more);
 
-} // namespace gewebe
+} // namespace gewebe::model

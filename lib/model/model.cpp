@@ -11,7 +11,7 @@
 #include <cmath>
 #include <string_view>
 
-namespace gewebe {
+namespace gewebe::model {
 
 namespace {
 
@@ -253,8 +253,8 @@ void require_safe_step(const Model& model, double step) {
   const auto min = std::min_element(steps.begin(), steps.end());
   if (min == steps.end() || *min >= step)
     return;
-  throw Error("a step of " + number_text(step) + " s is beyond the safe step " + number_text(*min) +
-              " s of node " + std::to_string(min - steps.begin()) +
+  throw Error("a step of " + text::number_text(step) + " s is beyond the safe step " +
+              text::number_text(*min) + " s of node " + std::to_string(min - steps.begin()) +
               ", expected a shorter one or scaled masses");
 }
 
@@ -385,4 +385,4 @@ TriangleMesh shown_mesh(const Model& model) {
   return mesh;
 }
 
-} // namespace gewebe
+} // namespace gewebe::model

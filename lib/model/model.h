@@ -38,7 +38,7 @@
 #include <string_view>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::model {
 
 struct Material {
   std::string name;
@@ -188,4 +188,4 @@ TriangleMesh surface_mesh(const Model& model);
 /// in their order, if it has one; else surface_mesh().
 TriangleMesh shown_mesh(const Model& model);
 
-} // namespace gewebe
+} // namespace gewebe::model

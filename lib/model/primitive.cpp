@@ -8,7 +8,7 @@
 #include <string>
 #include <utility>
 
-namespace gewebe {
+namespace gewebe::model {
 
 namespace {
 
@@ -137,4 +137,4 @@ TriangleMesh primitive_mesh(const Primitive& p) {
   return mesh;
 }
 
-} // namespace gewebe
+} // namespace gewebe::model

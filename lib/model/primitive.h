@@ -7,7 +7,7 @@
 #include <cstdint>
 #include <string_view>
 
-namespace gewebe {
+namespace gewebe::model {
 
 enum class PrimitiveShape { plane, tube, sphere };
 
@@ -31,4 +31,4 @@ Primitive parse_primitive(std::string_view text, std::string_view size);
 /// outside. The same bytes on every machine.
 TriangleMesh primitive_mesh(const Primitive& primitive);
 
-} // namespace gewebe
+} // namespace gewebe::model

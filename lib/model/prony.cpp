@@ -9,7 +9,7 @@
 #include <cstddef>
 #include <system_error>
 
-namespace gewebe {
+namespace gewebe::model {
 
 namespace {
 
@@ -55,7 +55,8 @@ std::vector<PronyTerm> parse_prony(std::string_view text) {
 std::string prony_text(std::span<const PronyTerm> terms) {
   std::string text(prefix);
   for (std::size_t k = 0; k < terms.size(); ++k)
-    text += (k == 0 ? "" : ",") + number_text(terms[k].share) + "@" + number_text(terms[k].time);
+    text += (k == 0 ? "" : ",") + text::number_text(terms[k].share) + "@" +
+            text::number_text(terms[k].time);
   return text;
 }
 
@@ -66,20 +67,21 @@ void check_prony(std::span<const PronyTerm> terms) {
   double sum = 0, before = 0;
   for (const PronyTerm& term : terms) {
     if (!(term.share > 0))
-      throw Error("a share of " + number_text(term.share) +
+      throw Error("a share of " + text::number_text(term.share) +
                   " in a Prony series, expected one above 0");
     if (!(term.time >= least_time && term.time <= most_time))
-      throw Error("a time of " + number_text(term.time) + " s in a Prony series, expected " +
-                  number_text(least_time) + " to " + number_text(most_time));
+      throw Error("a time of " + text::number_text(term.time) + " s in a Prony series, expected " +
+                  text::number_text(least_time) + " to " + text::number_text(most_time));
     if (!(term.time > before))
-      throw Error("a time of " + number_text(term.time) + " s behind " + number_text(before) +
-                  " s in a Prony series, expected ascending times");
+      throw Error("a time of " + text::number_text(term.time) + " s behind " +
+                  text::number_text(before) + " s in a Prony series, expected ascending times");
     before = term.time;
     sum += term.share;
   }
   if (!(sum <= most_share))
-    throw Error("shares of " + number_text(sum) + " together in a Prony series, expected at most " +
-                number_text(most_share) + ": the rest is what stays for ever");
+    throw Error("shares of " + text::number_text(sum) +
+                " together in a Prony series, expected at most " + text::number_text(most_share) +
+                ": the rest is what stays for ever");
 }
 
-} // namespace gewebe
+} // namespace gewebe::model

@@ -11,7 +11,7 @@
 #include <string_view>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::model {
 
 struct PronyTerm {
   double share = 0; ///< g, of the sudden stress
@@ -34,4 +34,4 @@ void check_prony(std::span<const PronyTerm> terms);
 /// Whether a word is one of these, right or wrong.
 bool is_prony(std::string_view word);
 
-} // namespace gewebe
+} // namespace gewebe::model

@@ -10,7 +10,7 @@
 #include <cmath>
 #include <cstdio>
 
-namespace gewebe {
+namespace gewebe::model {
 namespace {
 
 using Op = Selector::Op;
@@ -175,7 +175,7 @@ private:
 
   Flags boundary() {
     Flags flags(scope_);
-    for (const std::uint32_t node : border_points(model_.nodes.size(), model_.triangles))
+    for (const std::uint32_t node : mesh::border_points(model_.nodes.size(), model_.triangles))
       flags[node] = 1;
     return flags;
   }
@@ -200,7 +200,7 @@ private:
 };
 
 std::string place_text(const Vec3& p) {
-  return number_text(p.x) + "," + number_text(p.y) + "," + number_text(p.z);
+  return text::number_text(p.x) + "," + text::number_text(p.y) + "," + text::number_text(p.z);
 }
 
 /// Where the model is, for a selector that selects nothing; for one with near: also the node
@@ -271,4 +271,4 @@ std::vector<std::uint32_t> select_nodes(const Model& model, const NodeCounts& co
   return selected;
 }
 
-} // namespace gewebe
+} // namespace gewebe::model

@@ -12,7 +12,7 @@
 #include <utility>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::model {
 
 /// Ranges of node numbers, both ends included.
 using NodeRanges = std::vector<std::pair<std::uint32_t, std::uint32_t>>;
@@ -87,4 +87,4 @@ std::vector<std::uint32_t> select_nodes(const Model& model, const NodeCounts& co
 /// \throw Error, place "NAME:LINE"
 NodeRanges parse_node_list(std::string_view text, const std::string& name);
 
-} // namespace gewebe
+} // namespace gewebe::model

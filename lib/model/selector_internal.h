@@ -4,9 +4,9 @@
 #include <string>
 #include <string_view>
 
-namespace gewebe {
+namespace gewebe::model {
 
 /// A selector, or a part of one, as messages have it: in quotes, on one line, not too long.
 std::string quoted_selector(std::string_view text);
 
-} // namespace gewebe
+} // namespace gewebe::model

@@ -6,7 +6,7 @@
 #include <array>
 #include <charconv>
 
-namespace gewebe {
+namespace gewebe::model {
 
 namespace {
 
@@ -365,4 +365,4 @@ NodeRanges parse_node_list(std::string_view text, const std::string& name) {
   return ranges;
 }
 
-} // namespace gewebe
+} // namespace gewebe::model

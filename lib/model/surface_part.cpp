@@ -1,6 +1,6 @@
 #include "model/surface_part.h"
 
-namespace gewebe {
+namespace gewebe::model {
 
 namespace {
 
@@ -18,7 +18,7 @@ SurfacePart surface_part(const Model& model, std::span<const std::uint8_t> marke
       part.triangles.push_back(t);
       corners.push_back(model.triangles[t]);
     }
-  part.edges = edge_table(corners, model.nodes.size());
+  part.edges = mesh::edge_table(corners, model.nodes.size());
   for (std::uint32_t& corner : part.edges.corners)
     corner = 3 * part.triangles[corner / 3] + corner % 3;
   return part;
@@ -32,4 +32,4 @@ void mark_neighbours(const Model& model, std::vector<std::uint8_t>& marked) {
         marked[corner] = 1;
 }
 
-} // namespace gewebe
+} // namespace gewebe::model

@@ -10,12 +10,12 @@
 #include <span>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::model {
 
 struct SurfacePart {
   std::vector<std::uint32_t> triangles; ///< ascending
   /// Of these; corners are numbered as in the model, 3 triangle + k.
-  EdgeTable edges;
+  mesh::EdgeTable edges;
 };
 
 /// The triangles with a marked corner, in one pass over all. Edges with a marked end, and those
@@ -26,4 +26,4 @@ SurfacePart surface_part(const Model& model, std::span<const std::uint8_t> marke
 /// Marks the nodes of all triangles that have a marked corner: one ring more.
 void mark_neighbours(const Model& model, std::vector<std::uint8_t>& marked);
 
-} // namespace gewebe
+} // namespace gewebe::model

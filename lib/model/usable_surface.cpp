@@ -9,7 +9,7 @@
 #include <atomic>
 #include <span>
 
-namespace gewebe {
+namespace gewebe::model {
 namespace {
 
 constexpr std::uint32_t unused = UINT32_MAX;
@@ -60,7 +60,7 @@ bool any_twice(const UsableSurface& s, const Context& context) {
 /// Leaves out all but the first of faces with the same corners.
 void take_once(UsableSurface& s) {
   const std::vector<bool> twice =
-      repeated_faces(s.point_of_node.size(), s.triangles, SameFace::corners);
+      mesh::repeated_faces(s.point_of_node.size(), s.triangles, mesh::SameFace::corners);
   std::size_t kept = 0;
   for (std::size_t t = 0; t < s.triangles.size(); ++t) {
     if (twice[t])
@@ -77,8 +77,9 @@ void take_once(UsableSurface& s) {
 
 UsableSurface usable_surface(const TriangleMesh& mesh, const Context& context) {
   UsableSurface s;
-  s.face_of_triangle = those(context, mesh.triangles.size(),
-                             [&](std::size_t f) { return !has_equal_corners(mesh.triangles[f]); });
+  s.face_of_triangle = those(context, mesh.triangles.size(), [&](std::size_t f) {
+    return !mesh::has_equal_corners(mesh.triangles[f]);
+  });
   s.degenerate_faces = mesh.triangles.size() - s.face_of_triangle.size();
   if (s.face_of_triangle.empty())
     throw Error("no triangle, expected a surface");
@@ -104,12 +105,12 @@ UsableSurface usable_surface(const TriangleMesh& mesh, const Context& context) {
           corner = node_of_point[corner];
     });
   }
-  s.edges = edge_table(s.triangles, s.point_of_node.size(), context);
+  s.edges = mesh::edge_table(s.triangles, s.point_of_node.size(), context);
   if (any_twice(s, context)) {
     take_once(s);
-    s.edges = edge_table(s.triangles, s.point_of_node.size(), context);
+    s.edges = mesh::edge_table(s.triangles, s.point_of_node.size(), context);
   }
   return s;
 }
 
-} // namespace gewebe
+} // namespace gewebe::model

@@ -2,7 +2,7 @@
 // SIMD vectors of four numbers, for kernels that are compiled once for each instruction set. The
 // calling convention for returned vectors differs between the sets, so no function returns one.
 
-namespace gewebe {
+namespace gewebe::numeric {
 namespace {
 
 using Four = double __attribute__((vector_size(32), aligned(8), may_alias));
@@ -22,4 +22,4 @@ inline void load(const float* at, Four& to) {
 }
 
 } // namespace
-} // namespace gewebe
+} // namespace gewebe::numeric

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <type_traits>
 
-namespace gewebe {
+namespace gewebe::numeric {
 
 /// Whether x is NaN; false for types without NaN.
 template <class T>
@@ -28,4 +28,4 @@ T smaller(T a, std::type_identity_t<T> b) {
   return a <= b || is_nan(a) ? a : b;
 }
 
-} // namespace gewebe
+} // namespace gewebe::numeric

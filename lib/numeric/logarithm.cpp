@@ -6,7 +6,7 @@
 #include <cstdint>
 #include <limits>
 
-namespace gewebe {
+namespace gewebe::numeric {
 
 double natural_logarithm(double x) {
   if (!(x > 0))
@@ -42,4 +42,4 @@ double natural_logarithm(double x) {
   return k * ln2_high - ((half - (s * (half + rest) + k * ln2_low)) - f);
 }
 
-} // namespace gewebe
+} // namespace gewebe::numeric

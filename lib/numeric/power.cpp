@@ -8,7 +8,7 @@
 #include <cstdint>
 #include <limits>
 
-namespace gewebe {
+namespace gewebe::numeric {
 
 namespace {
 
@@ -50,4 +50,4 @@ double power(double x, double y) {
   return exponential(y * natural_logarithm(x));
 }
 
-} // namespace gewebe
+} // namespace gewebe::numeric

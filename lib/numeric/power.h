@@ -2,7 +2,7 @@
 // Exponential function and powers made of + - * / alone, so that results are the same with every
 // libm and on every processor.
 
-namespace gewebe {
+namespace gewebe::numeric {
 
 /// e^x, error below 1 ulp where the result is a normal number. 0 below about -745, inf above about
 /// 709.8; NaN of NaN.
@@ -12,4 +12,4 @@ double exponential(double x);
 /// \pre x >= 0; 0^y is 0 for y > 0, inf for y < 0
 double power(double x, double y);
 
-} // namespace gewebe
+} // namespace gewebe::numeric

@@ -2,7 +2,7 @@
 
 #include <cmath>
 
-namespace gewebe {
+namespace gewebe::numeric {
 namespace {
 
 /// P(|T| <= t) at t = tan(angle) sqrt(freedom).
@@ -28,4 +28,4 @@ double student_t_quantile(double tail, std::uint64_t freedom) {
   return std::sqrt(static_cast<double>(freedom)) * std::tan(0.5 * (low + high));
 }
 
-} // namespace gewebe
+} // namespace gewebe::numeric

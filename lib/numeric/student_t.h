@@ -2,7 +2,7 @@
 
 #include <cstdint>
 
-namespace gewebe {
+namespace gewebe::numeric {
 
 /// Quantile of Student's t distribution: the t that a variable exceeds with probability `tail`.
 ///
@@ -12,4 +12,4 @@ namespace gewebe {
 /// \param freedom  degrees of freedom, at least 1
 double student_t_quantile(double tail, std::uint64_t freedom);
 
-} // namespace gewebe
+} // namespace gewebe::numeric

@@ -19,7 +19,7 @@
 // Fuchs, A Sorting Classification of Parallel Rendering, 1994 (sort-middle). What happens inside a
 // tile stands in raster_kernel_lanes_internal.h.
 
-namespace gewebe {
+namespace gewebe::raster {
 namespace {
 
 // Vertices beyond it from the picture's edges are cut off, so that coordinates on the picture fit
@@ -34,11 +34,11 @@ struct ClipVertex {
 /// From clip space to the picture.
 class Viewport {
 public:
-  Viewport(const Projection& projection, std::uint32_t width, std::uint32_t height)
+  Viewport(const shading::Projection& projection, std::uint32_t width, std::uint32_t height)
       : m_(projection.matrix), near_(projection.near), half_x_(width / 2.0), half_y_(height / 2.0),
         guard_x_(1 + guard_pixels / half_x_), guard_y_(1 + guard_pixels / half_y_) {}
 
-  ClipVertex transform(const DrawVertex& v) const {
+  ClipVertex transform(const shading::DrawVertex& v) const {
     const double x = v.position[0], y = v.position[1], z = v.position[2];
     const auto row = [&](const std::array<double, 4>& r) {
       return r[0] * x + r[1] * y + r[2] * z + r[3];
@@ -123,8 +123,8 @@ struct Screen {
   }
 };
 
-Screen project(const Drawing& drawing, const Viewport& viewport, const RasterKernels& kernels,
-               const Context& context) {
+Screen project(const shading::Drawing& drawing, const Viewport& viewport,
+               const RasterKernels& kernels, const Context& context) {
   constexpr std::size_t grain = 4096;
   Screen screen;
   const std::size_t vertices = drawing.vertices.size();
@@ -143,7 +143,8 @@ Screen project(const Drawing& drawing, const Viewport& viewport, const RasterKer
 }
 
 /// Adds the pieces inside the guard band of a triangle that reaches beyond it.
-void clip(const Drawing& drawing, const Viewport& viewport, std::uint32_t n, Screen& screen) {
+void clip(const shading::Drawing& drawing, const Viewport& viewport, std::uint32_t n,
+          Screen& screen) {
   const Triangle& t = drawing.triangles[n];
   const std::vector<ClipVertex> polygon =
       clipped(viewport, {viewport.transform(drawing.vertices[t[0]]),
@@ -181,7 +182,7 @@ void each_bin(const KernelSeen& seen, std::size_t across, Use&& use) {
 }
 
 /// Clips triangles that must be, and sorts all.
-Bins sorted(const Drawing& drawing, const Viewport& viewport, const RasterKernels& kernels,
+Bins sorted(const shading::Drawing& drawing, const Viewport& viewport, const RasterKernels& kernels,
             std::uint32_t width, std::uint32_t height, int samples, const Context& context,
             Screen& screen) {
   Bins bins;
@@ -254,7 +255,7 @@ void set(float (&to)[3], const Vec3& from) {
 /// A material's textures as kernels see them.
 class Textures {
 public:
-  explicit Textures(const SurfaceMaterial& material) {
+  explicit Textures(const texture::SurfaceMaterial& material) {
     take(material.base, 0);
     take(material.detail, 1);
     take(material.reflection, 2);
@@ -263,11 +264,11 @@ public:
   const KernelTexture* at(std::size_t n) const { return there_[n] ? &textures_[n] : nullptr; }
 
 private:
-  void take(const std::optional<Texture>& texture, std::size_t n) {
+  void take(const std::optional<texture::Texture>& texture, std::size_t n) {
     if (!texture)
       return;
     there_[n] = true;
-    for (const TextureLevel& level : texture->levels)
+    for (const texture::TextureLevel& level : texture->levels)
       levels_[n].push_back({static_cast<std::int32_t>(level.width),
                             static_cast<std::int32_t>(level.height),
                             static_cast<std::int32_t>(level.first)});
@@ -275,7 +276,7 @@ private:
                     texture->texels->data(),
                     static_cast<std::int32_t>(levels_[n].size()),
                     texture->channels == 1,
-                    texture->options.filter == TextureFilter::nearest,
+                    texture->options.filter == texture::TextureFilter::nearest,
                     texture->options.sphere,
                     static_cast<int>(texture->options.wrap)};
   }
@@ -284,10 +285,11 @@ private:
   std::array<std::vector<KernelLevel>, 4> levels_;
 };
 
-KernelScene scene_of(const Drawing& drawing, const Viewport& viewport,
-                     const SurfaceMaterial& material, const Textures& textures,
+KernelScene scene_of(const shading::Drawing& drawing, const Viewport& viewport,
+                     const texture::SurfaceMaterial& material, const Textures& textures,
                      std::optional<RasterRest>& rest) {
-  static_assert(sizeof(DrawVertex) == 10 * sizeof(float) && sizeof(DrawFrame) == 7 * sizeof(float));
+  static_assert(sizeof(shading::DrawVertex) == 10 * sizeof(float) &&
+                sizeof(shading::DrawFrame) == 7 * sizeof(float));
   static_assert(sizeof(Triangle) == 3 * sizeof(std::uint32_t));
   KernelScene scene{};
   scene.vertices = reinterpret_cast<const float*>(drawing.vertices.data());
@@ -318,18 +320,19 @@ KernelScene scene_of(const Drawing& drawing, const Viewport& viewport,
   return scene;
 }
 
-std::uint32_t background_of(const SurfaceMaterial& material) {
-  const std::array<std::uint8_t, 3> background = stored(material.background);
+std::uint32_t background_of(const texture::SurfaceMaterial& material) {
+  const std::array<std::uint8_t, 3> background = texture::stored(material.background);
   return background[0] | static_cast<std::uint32_t>(background[1]) << 8 |
          static_cast<std::uint32_t>(background[2]) << 16;
 }
 
 /// The scene of some triangles, linked to that of the next ones.
 struct MaterialScene {
-  MaterialScene(const Drawing& drawing, const Viewport& viewport, const SurfaceMaterial& material)
+  MaterialScene(const shading::Drawing& drawing, const Viewport& viewport,
+                const texture::SurfaceMaterial& material)
       : textures(material), scene(scene_of(drawing, viewport, material, textures, rest)) {}
   /// What the film of its triangles mirrors.
-  void cover(const WetFilm& of, const Vec3& surroundings, double full_distance) {
+  void cover(const texture::WetFilm& of, const Vec3& surroundings, double full_distance) {
     if (!(of.amount > 0))
       return;
     if (scene.frames == nullptr)
@@ -349,15 +352,15 @@ struct MaterialScene {
 };
 
 /// One for each group of triangles, one at least.
-std::list<MaterialScene> scenes_of(const Drawing& drawing, const Viewport& viewport,
-                                   const SurfaceMaterial& material) {
+std::list<MaterialScene> scenes_of(const shading::Drawing& drawing, const Viewport& viewport,
+                                   const texture::SurfaceMaterial& material) {
   std::list<MaterialScene> scenes;
-  for (std::size_t g = 0; g < group_count(drawing); ++g) {
-    const std::span<const Triangle> group = triangles_of_group(drawing, g);
+  for (std::size_t g = 0; g < shading::group_count(drawing); ++g) {
+    const std::span<const Triangle> group = shading::triangles_of_group(drawing, g);
     if (group.empty() && g > 0)
       continue;
     KernelScene* const last = scenes.empty() ? nullptr : &scenes.back().scene;
-    const SurfaceMaterial& own = material_of_group(material, g);
+    const texture::SurfaceMaterial& own = texture::material_of_group(material, g);
     MaterialScene& made = scenes.emplace_back(drawing, viewport, own);
     if (!group.empty())
       made.cover(own.film, material.background, drawing.full_distance);
@@ -377,9 +380,10 @@ struct alignas(64) CacheLine {
 
 } // namespace
 
-Image render_cpu(const Drawing& drawing, const Projection& projection,
-                 const SurfaceMaterial& material, std::uint32_t width, std::uint32_t height,
-                 int samples, const Context& context, RenderReport* report) {
+texture::Image render_cpu(const shading::Drawing& drawing, const shading::Projection& projection,
+                          const texture::SurfaceMaterial& material, std::uint32_t width,
+                          std::uint32_t height, int samples, const Context& context,
+                          RenderReport* report) {
   const Viewport viewport(projection, width, height);
   const RasterKernels& kernels =
       context.cpu == CpuLevel::baseline ? raster_kernels_baseline : raster_kernels_avx2;
@@ -393,7 +397,7 @@ Image render_cpu(const Drawing& drawing, const Projection& projection,
                                    static_cast<std::uint32_t>(drawing.triangles.size()),
                                    screen.pieces.data(),
                                    screen.whole.data()};
-  Image image{width, height, 3, {}};
+  texture::Image image{width, height, 3, {}};
   image.values.resize(std::size_t{3} * width * height);
   const std::size_t tiles = bins.across * bins.down;
   std::vector<std::uint64_t> covered(tiles);
@@ -434,4 +438,4 @@ double render_cpu_bytes(std::uint32_t width, std::uint32_t height, int samples,
          static_cast<double>(raster_scratch_bytes(samples)) * thread_count(context);
 }
 
-} // namespace gewebe
+} // namespace gewebe::raster

@@ -10,7 +10,7 @@
 
 #include <cstdint>
 
-namespace gewebe {
+namespace gewebe::raster {
 
 /// The largest side of a picture, samples included.
 constexpr std::uint32_t max_picture_side = 65536;
@@ -27,12 +27,13 @@ struct RenderReport {
 /// which every surface has its value at the pixel's centre (multisampling). Every CPU level gives
 /// the same bytes.
 /// \pre width, height <= max_picture_side, samples is 1 or 4   \throw Cancelled
-Image render_cpu(const Drawing& drawing, const Projection& projection,
-                 const SurfaceMaterial& material, std::uint32_t width, std::uint32_t height,
-                 int samples, const Context& context, RenderReport* report = nullptr);
+texture::Image render_cpu(const shading::Drawing& drawing, const shading::Projection& projection,
+                          const texture::SurfaceMaterial& material, std::uint32_t width,
+                          std::uint32_t height, int samples, const Context& context,
+                          RenderReport* report = nullptr);
 
 /// Bytes that render_cpu needs for a picture, without its drawing.
 double render_cpu_bytes(std::uint32_t width, std::uint32_t height, int samples,
                         const Context& context);
 
-} // namespace gewebe
+} // namespace gewebe::raster

@@ -2,7 +2,7 @@
 #include "raster/raster_kernel_screen_lanes_internal.h"
 #include "raster/raster_kernel_tile_lanes_internal.h"
 
-namespace gewebe {
+namespace gewebe::raster {
 
 const RasterKernels raster_kernels_baseline{place_all, sort_all, draw_tile};
 
@@ -11,4 +11,4 @@ std::size_t raster_scratch_bytes(int samples) {
          (sizeof(float) + sizeof(std::uint32_t));
 }
 
-} // namespace gewebe
+} // namespace gewebe::raster

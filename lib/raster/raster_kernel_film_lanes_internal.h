@@ -4,7 +4,7 @@
 
 #include "raster/raster_kernel_rest_lanes_internal.h"
 
-namespace gewebe {
+namespace gewebe::raster {
 namespace {
 
 inline Floats mirrored_share(Floats reflectance, Floats cosine) {
@@ -44,4 +44,4 @@ inline void wet(const KernelScene& scene, const Slots& slots, std::size_t at, Fl
 }
 
 } // namespace
-} // namespace gewebe
+} // namespace gewebe::raster

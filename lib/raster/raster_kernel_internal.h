@@ -6,7 +6,7 @@
 #include <cstddef>
 #include <cstdint>
 
-namespace gewebe {
+namespace gewebe::raster {
 
 constexpr int raster_tile_bits_x = 6, raster_tile_bits_y = 5;
 constexpr int raster_tile_width = 1 << raster_tile_bits_x; // pixels
@@ -29,7 +29,7 @@ struct KernelTexture {
 /// A texture on the shape at rest: an image by three projections, or a solid one, or neither.
 struct KernelRestLayer {
   const KernelTexture* image;
-  const SolidPlan* solid;
+  const texture::SolidPlan* solid;
 };
 
 /// What textures on the shape at rest need (see rest.h). Vertices at rest are 6 floats: place,
@@ -148,4 +148,4 @@ extern const RasterKernels raster_kernels_baseline, raster_kernels_avx2;
 
 std::size_t raster_scratch_bytes(int samples);
 
-} // namespace gewebe
+} // namespace gewebe::raster

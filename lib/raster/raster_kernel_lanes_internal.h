@@ -14,7 +14,7 @@
 
 #pragma GCC diagnostic ignored "-Wpsabi" // no vector crosses a call that is not inlined
 
-namespace gewebe {
+namespace gewebe::raster {
 
 constexpr int lanes = 8;
 constexpr std::uint32_t nothing = UINT32_MAX;
@@ -789,4 +789,4 @@ inline Colors shade(const KernelScene& scene, Slots& slots, std::size_t at) {
 }
 
 } // namespace
-} // namespace gewebe
+} // namespace gewebe::raster

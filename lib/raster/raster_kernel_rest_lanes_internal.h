@@ -4,7 +4,7 @@
 
 #include "raster/raster_kernel_lanes_internal.h"
 
-namespace gewebe {
+namespace gewebe::raster {
 namespace {
 
 // --- Attributes
@@ -98,7 +98,7 @@ inline Floats fade(Floats t) {
   return t * t * t * (t * (t * splat(6.0F) - splat(15.0F)) + splat(10.0F));
 }
 
-inline Floats gradient_noise(const SolidPlan& plan, const Vector& y, int k) {
+inline Floats gradient_noise(const texture::SolidPlan& plan, const Vector& y, int k) {
   const Floats power = splat(static_cast<float>(1 << k));
   const Floats x[3] = {tame(y.x * power + splat(plan.shift[k][0])),
                        tame(y.y * power + splat(plan.shift[k][1])),
@@ -127,12 +127,12 @@ inline Floats gradient_noise(const SolidPlan& plan, const Vector& y, int k) {
 }
 
 /// a_k for a footprint in cells of octave 0.
-inline Floats share_of_octave(const SolidPlan& plan, Floats footprint, int k) {
+inline Floats share_of_octave(const texture::SolidPlan& plan, Floats footprint, int k) {
   return plan.filtered ? part_of(splat(1.5F) - splat(static_cast<float>(2 << k)) * footprint)
                        : splat(1.0F);
 }
 
-inline Floats noise_value(const SolidPlan& plan, const Vector& y, Floats footprint) {
+inline Floats noise_value(const texture::SolidPlan& plan, const Vector& y, Floats footprint) {
   Floats sum = splat(0.5F);
   for (int k = 0; k < plan.octaves; ++k) {
     const Floats share = share_of_octave(plan, footprint, k);
@@ -143,7 +143,7 @@ inline Floats noise_value(const SolidPlan& plan, const Vector& y, Floats footpri
   return part_of(sum);
 }
 
-inline Floats veins_value(const SolidPlan& plan, const Vector& y, Floats footprint) {
+inline Floats veins_value(const texture::SolidPlan& plan, const Vector& y, Floats footprint) {
   const Floats none = splat(0.0F), one = splat(1.0F), width = splat(plan.width);
   Floats clear = one, reach = one;
   Floats share = share_of_octave(plan, footprint, 0);
@@ -165,25 +165,26 @@ inline Floats veins_value(const SolidPlan& plan, const Vector& y, Floats footpri
     const Floats bump = larger(one - m * m / square, none);
     const Floats line = bump * bump * (width / root(square));
     clear *= one - (share * reach * line + (one - share) * faded);
-    reach *= larger(one - m * m * splat(1 / (vein_reach * vein_reach)), none);
+    reach *= larger(one - m * m * splat(1 / (texture::vein_reach * texture::vein_reach)), none);
     share = finer;
   }
   return one - clear;
 }
 
 /// f at a place, for a footprint in the place's unit.
-inline void solid_value(const SolidPlan& plan, const Vector& place, const Floats& footprint,
-                        Floats& value) {
+inline void solid_value(const texture::SolidPlan& plan, const Vector& place,
+                        const Floats& footprint, Floats& value) {
   const auto row = [&](int a) {
     return splat(plan.rows[a][0]) * place.x + splat(plan.rows[a][1]) * place.y +
            splat(plan.rows[a][2]) * place.z + splat(plan.part[a]);
   };
   const Vector y{row(0), row(1), row(2)};
   const Floats cells = larger(smaller(footprint * splat(plan.cells), splat(1e9F)), splat(0.0F));
-  value = plan.kind == SolidKind::noise ? noise_value(plan, y, cells) : veins_value(plan, y, cells);
+  value = plan.kind == texture::SolidKind::noise ? noise_value(plan, y, cells)
+                                                 : veins_value(plan, y, cells);
 }
 
-inline void solid_colors(const SolidPlan* plan, const Vector& place, Floats footprint,
+inline void solid_colors(const texture::SolidPlan* plan, const Vector& place, Floats footprint,
                          Floats (&colors)[3]) {
   if (plan == nullptr)
     return;
@@ -319,4 +320,4 @@ inline void shade_rest(const KernelScene& scene, const Slots& slots, std::size_t
 }
 
 } // namespace
-} // namespace gewebe
+} // namespace gewebe::raster

@@ -4,7 +4,7 @@
 
 #include "raster/raster_kernel_lanes_internal.h"
 
-namespace gewebe {
+namespace gewebe::raster {
 namespace {
 
 using Longs = std::int64_t __attribute__((vector_size(64)));
@@ -128,4 +128,4 @@ inline void sort_all(const KernelSorting& sorting, const std::uint32_t* corners,
 }
 
 } // namespace
-} // namespace gewebe
+} // namespace gewebe::raster

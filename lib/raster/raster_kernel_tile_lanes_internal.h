@@ -6,7 +6,7 @@
 
 #include <cstring>
 
-namespace gewebe {
+namespace gewebe::raster {
 namespace {
 
 inline void to_bytes(const float (&rgb)[3], std::uint8_t* out) {
@@ -164,4 +164,4 @@ inline std::uint64_t draw_tile(const KernelScene& scene, const KernelScreen& scr
 }
 
 } // namespace
-} // namespace gewebe
+} // namespace gewebe::raster

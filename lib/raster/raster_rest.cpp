@@ -2,21 +2,22 @@
 
 #include "base/error.h"
 
-namespace gewebe {
+namespace gewebe::raster {
 
-RasterRest::RasterRest(const Drawing& drawing, const SurfaceMaterial& material,
+RasterRest::RasterRest(const shading::Drawing& drawing, const texture::SurfaceMaterial& material,
                        KernelScene& scene) {
-  if (!is_at_rest(material) || drawing.vertices.empty())
+  if (!texture::is_at_rest(material) || drawing.vertices.empty())
     return;
-  static_assert(sizeof(DrawRest) == 6 * sizeof(float) && sizeof(DrawTurn) == 6 * sizeof(float));
+  static_assert(sizeof(texture::DrawRest) == 6 * sizeof(float) &&
+                sizeof(texture::DrawTurn) == 6 * sizeof(float));
   if (drawing.rests.size() != drawing.vertices.size())
     throw Error("textures on the shape at rest for a drawing without it, expected its places");
   rest_.vertices = reinterpret_cast<const float*>(drawing.rests.data());
   if (!drawing.turns.empty())
     rest_.turns = reinterpret_cast<const float*>(drawing.turns.data());
-  const auto image = [&](const std::optional<Texture>& texture, const KernelTexture*& there,
-                         KernelRestLayer& layer) {
-    if (!is_triplanar(material, texture))
+  const auto image = [&](const std::optional<texture::Texture>& texture,
+                         const KernelTexture*& there, KernelRestLayer& layer) {
+    if (!texture::is_triplanar(material, texture))
       return;
     layer.image = there;
     rest_.normals = true;
@@ -27,11 +28,11 @@ RasterRest::RasterRest(const Drawing& drawing, const SurfaceMaterial& material,
   image(material.detail, scene.detail, rest_.detail);
   image(material.reflection, scene.reflection, rest_.reflection);
   image(material.structure, scene.structure, rest_.structure);
-  const auto solid = [&](const std::optional<SolidTexture>& texture, std::optional<SolidPlan>& plan,
-                         KernelRestLayer& layer) {
+  const auto solid = [&](const std::optional<texture::SolidTexture>& texture,
+                         std::optional<texture::SolidPlan>& plan, KernelRestLayer& layer) {
     if (!texture)
       return;
-    plan = solid_plan(*texture, drawing.rest_origin, drawing.rest_scale);
+    plan = texture::solid_plan(*texture, drawing.rest_origin, drawing.rest_scale);
     layer.solid = &*plan;
     rest_.derivatives = rest_.derivatives || texture->filtered;
   };
@@ -48,4 +49,4 @@ RasterRest::RasterRest(const Drawing& drawing, const SurfaceMaterial& material,
   scene.rest = &rest_;
 }
 
-} // namespace gewebe
+} // namespace gewebe::raster

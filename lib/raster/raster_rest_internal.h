@@ -7,18 +7,19 @@
 
 #include <optional>
 
-namespace gewebe {
+namespace gewebe::raster {
 
 class RasterRest {
 public:
   /// Takes the images that lie on the shape at rest out of `scene`.
-  RasterRest(const Drawing& drawing, const SurfaceMaterial& material, KernelScene& scene);
+  RasterRest(const shading::Drawing& drawing, const texture::SurfaceMaterial& material,
+             KernelScene& scene);
   RasterRest(const RasterRest&) = delete;
   RasterRest& operator=(const RasterRest&) = delete;
 
 private:
   KernelRest rest_{};
-  std::optional<SolidPlan> base_, detail_, structure_;
+  std::optional<texture::SolidPlan> base_, detail_, structure_;
 };
 
-} // namespace gewebe
+} // namespace gewebe::raster

@@ -7,7 +7,7 @@
 #include <algorithm>
 #include <charconv>
 
-namespace gewebe {
+namespace gewebe::render {
 const std::vector<std::string>& backend_names() {
   static const std::vector<std::string> names{"auto", "gl", "cpu"};
   return names;
@@ -37,28 +37,28 @@ std::pair<std::uint32_t, std::uint32_t> picture_size_from_text(std::string_view 
 }
 
 struct Painter::State {
-  State(const SurfaceMaterial& l, const PictureOptions& o, const Context& c)
+  State(const texture::SurfaceMaterial& l, const PictureOptions& o, const Context& c)
       : material(l), options(o), context(c) {
     const std::uint64_t w = std::uint64_t{options.width} * options.supersample;
     const std::uint64_t h = std::uint64_t{options.height} * options.supersample;
-    if (std::max(w, h) > max_picture_side)
+    if (std::max(w, h) > raster::max_picture_side)
       throw Error("a picture of " + std::to_string(w) + " x " + std::to_string(h) +
-                  " samples, expected sides up to " + std::to_string(max_picture_side));
+                  " samples, expected sides up to " + std::to_string(raster::max_picture_side));
     width = static_cast<std::uint32_t>(w);
     height = static_cast<std::uint32_t>(h);
     if (options.backend != Backend::cpu)
       attempt([&] {
-        require_memory(context, render_gl_bytes(width, height, options.samples), "the picture");
+        require_memory(context, gl::render_gl_bytes(width, height, options.samples), "the picture");
         gl.emplace();
-        if (options.backend == Backend::automatic && options.gl.mode == GlMode::shader &&
+        if (options.backend == Backend::automatic && options.gl.mode == gl::GlMode::shader &&
             gl->is_software())
           return gl.reset();
-        GlOptions with_samples = options.gl;
+        gl::GlOptions with_samples = options.gl;
         with_samples.samples = options.samples;
         renderer.emplace(*gl, material, width, height, with_samples);
       });
     if (!renderer)
-      require_memory(context, render_cpu_bytes(width, height, options.samples, context),
+      require_memory(context, raster::render_cpu_bytes(width, height, options.samples, context),
                      "the picture");
   }
 
@@ -88,33 +88,35 @@ struct Painter::State {
     }
   }
 
-  SurfaceMaterial material;
+  texture::SurfaceMaterial material;
   PictureOptions options;
   Context context;
   std::uint32_t width = 0, height = 0;
-  std::optional<GlContext> gl;
-  std::optional<GlRenderer> renderer;
+  std::optional<gl::GlContext> gl;
+  std::optional<gl::GlRenderer> renderer;
   std::string gl_failure;
   std::uint64_t version = 0, uploads = 0; ///< of the drawing that OpenGL has
 };
 
-Painter::Painter(const SurfaceMaterial& material, const PictureOptions& options,
+Painter::Painter(const texture::SurfaceMaterial& material, const PictureOptions& options,
                  const Context& context)
     : state_(std::make_unique<State>(material, options, context)) {}
 Painter::~Painter() = default;
 
 bool Painter::per_pixel() const {
   const PictureOptions& options = state_->options;
-  const bool can = options.backend == Backend::cpu || options.gl.mode == GlMode::shader;
+  const bool can = options.backend == Backend::cpu || options.gl.mode == gl::GlMode::shader;
   return options.per_pixel.value_or(can);
 }
 
-Image Painter::paint(const Drawing& drawing, const Camera& camera, PictureReport* report) {
+texture::Image Painter::paint(const shading::Drawing& drawing, const shading::Camera& camera,
+                              PictureReport* report) {
   State& s = *state_;
-  const Projection projection = make_projection(camera, drawing.box, drawing.origin, drawing.scale);
+  const shading::Projection projection =
+      shading::make_projection(camera, drawing.box, drawing.origin, drawing.scale);
   PictureReport ours;
   PictureReport& told = report != nullptr ? *report : ours;
-  Image image;
+  texture::Image image;
   if (s.renderer)
     s.attempt([&] {
       s.gl->make_current();
@@ -137,20 +139,21 @@ Image Painter::paint(const Drawing& drawing, const Camera& camera, PictureReport
     });
   told.gl_failure = s.gl_failure;
   if (!s.renderer) {
-    RenderReport drawn;
-    image = render_cpu(drawing, projection, s.material, s.width, s.height, s.options.samples,
-                       s.context, &drawn);
+    raster::RenderReport drawn;
+    image = raster::render_cpu(drawing, projection, s.material, s.width, s.height,
+                               s.options.samples, s.context, &drawn);
     told.backend = Backend::cpu;
     told.passes = 1;
     told.triangles = drawn.triangles;
     told.covered = drawn.covered;
   }
-  return shrunk(image, s.options.supersample);
+  return texture::shrunk(image, s.options.supersample);
 }
 
-Image make_picture(const Drawing& drawing, const Camera& camera, const SurfaceMaterial& material,
-                   const PictureOptions& options, const Context& context, PictureReport* report) {
+texture::Image make_picture(const shading::Drawing& drawing, const shading::Camera& camera,
+                            const texture::SurfaceMaterial& material, const PictureOptions& options,
+                            const Context& context, PictureReport* report) {
   return Painter(material, options, context).paint(drawing, camera, report);
 }
 
-} // namespace gewebe
+} // namespace gewebe::render

@@ -16,7 +16,7 @@
 #include <utility>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::render {
 
 enum class Backend {
   automatic, ///< OpenGL on a graphics card, else our rasteriser, which is quicker than software
@@ -38,7 +38,7 @@ struct PictureOptions {
   std::uint32_t width = 512, height = 512;
   std::uint32_t supersample = 1; ///< a pixel is the mean of this many samples squared
   int samples = 1;               ///< of each of them, 1 or 4 (multisampling)
-  GlOptions gl;                  ///< of the backend gl; its samples don't count
+  gl::GlOptions gl;              ///< of the backend gl; its samples don't count
   std::optional<bool> per_pixel; ///< frames for each pixel; nothing: where the mode can
 };
 
@@ -60,7 +60,8 @@ public:
   /// software counts where the mode is one of its fixed functions alone.
   /// \throw Error if sides times supersample exceed max_picture_side or the estimate the memory,
   /// and, with Backend::gl, where OpenGL fails
-  Painter(const SurfaceMaterial& material, const PictureOptions& options, const Context& context);
+  Painter(const texture::SurfaceMaterial& material, const PictureOptions& options,
+          const Context& context);
   ~Painter();
   Painter(const Painter&) = delete;
   Painter& operator=(const Painter&) = delete;
@@ -71,7 +72,8 @@ public:
   /// The picture, three channels. All modes draw the same: of 255, values differ by 2 at most where
   /// the picture is continuous, for one kind of drawings.
   /// \throw Error where OpenGL fails; Cancelled
-  Image paint(const Drawing& drawing, const Camera& camera, PictureReport* report = nullptr);
+  texture::Image paint(const shading::Drawing& drawing, const shading::Camera& camera,
+                       PictureReport* report = nullptr);
 
 private:
   struct State;
@@ -79,8 +81,8 @@ private:
 };
 
 /// One picture.
-Image make_picture(const Drawing& drawing, const Camera& camera, const SurfaceMaterial& material,
-                   const PictureOptions& options, const Context& context,
-                   PictureReport* report = nullptr);
+texture::Image make_picture(const shading::Drawing& drawing, const shading::Camera& camera,
+                            const texture::SurfaceMaterial& material, const PictureOptions& options,
+                            const Context& context, PictureReport* report = nullptr);
 
-} // namespace gewebe
+} // namespace gewebe::render

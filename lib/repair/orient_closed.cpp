@@ -13,28 +13,29 @@
 #include <span>
 #include <utility>
 
-namespace gewebe {
+namespace gewebe::repair {
 namespace {
 
-bool balanced(const EdgeSides& edges) {
+bool balanced(const mesh::EdgeSides& edges) {
   bool all = true;
-  edges.for_each_edge(
-      [&](std::uint32_t, std::span<const EdgeSide> edge) { all = all && surplus(edge) == 0; });
+  edges.for_each_edge([&](std::uint32_t, std::span<const mesh::EdgeSide> edge) {
+    all = all && mesh::surplus(edge) == 0;
+  });
   return all;
 }
 
 /// Which triangles to flip so that neighbours over edges of two triangles agree; empty where that
 /// cannot be.
-std::vector<char> agreeing_flips(const EdgeSides& edges, std::size_t triangles) {
+std::vector<char> agreeing_flips(const mesh::EdgeSides& edges, std::size_t triangles) {
   constexpr std::uint32_t none = UINT32_MAX;
   // Per triangle up to three neighbours: 2 t, and 1 more where one of the two must be flipped.
   std::vector<std::array<std::uint32_t, 3>> neighbours(triangles, {none, none, none});
-  const auto link = [&](const EdgeSide& a, const EdgeSide& b) {
+  const auto link = [&](const mesh::EdgeSide& a, const mesh::EdgeSide& b) {
     auto& list = neighbours[a.face()];
     *std::find(list.begin(), list.end() - 1, none) =
         2 * b.face() + (a.backward() == b.backward() ? 1 : 0);
   };
-  edges.for_each_edge([&](std::uint32_t, std::span<const EdgeSide> edge) {
+  edges.for_each_edge([&](std::uint32_t, std::span<const mesh::EdgeSide> edge) {
     if (edge.size() == 2) {
       link(edge[0], edge[1]);
       link(edge[1], edge[0]);
@@ -191,14 +192,14 @@ bool orient_closed(const std::vector<Vec3>& points, std::vector<Triangle>& trian
                    OrientReport* report) {
   DisjointSets sets(triangles.size());
   std::vector<Triangle> turned = triangles;
-  if (!join_opposite_sides(points.size(), triangles, sets)) {
+  if (!mesh::join_opposite_sides(points.size(), triangles, sets)) {
     sets = DisjointSets(triangles.size());
     std::vector<Triangle> welded = triangles;
-    const std::vector<std::uint32_t> representative = first_at_position(points);
+    const std::vector<std::uint32_t> representative = mesh::first_at_position(points);
     for (Triangle& t : welded)
       for (std::uint32_t& corner : t)
         corner = representative[corner];
-    EdgeSides edges(points.size(), welded);
+    mesh::EdgeSides edges(points.size(), welded);
     if (!balanced(edges)) {
       const std::vector<char> flip = agreeing_flips(edges, triangles.size());
       for (std::size_t n = 0; n < flip.size(); ++n)
@@ -206,12 +207,12 @@ bool orient_closed(const std::vector<Vec3>& points, std::vector<Triangle>& trian
           std::swap(turned[n][1], turned[n][2]);
           std::swap(welded[n][1], welded[n][2]);
         }
-      edges = EdgeSides(points.size(), welded);
+      edges = mesh::EdgeSides(points.size(), welded);
       if (flip.empty() || !balanced(edges))
         return false;
     }
-    edges.for_each_edge([&](std::uint32_t, std::span<const EdgeSide> edge) {
-      for (const EdgeSide& side : edge)
+    edges.for_each_edge([&](std::uint32_t, std::span<const mesh::EdgeSide> edge) {
+      for (const mesh::EdgeSide& side : edge)
         sets.join(edge[0].face(), side.face());
     });
   }
@@ -228,4 +229,4 @@ bool orient_closed(const std::vector<Vec3>& points, std::vector<Triangle>& trian
   return true;
 }
 
-} // namespace gewebe
+} // namespace gewebe::repair

@@ -6,7 +6,7 @@
 #include <cstdint>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::repair {
 
 /// What became of a mesh.
 struct OrientReport {
@@ -27,4 +27,4 @@ struct OrientReport {
 bool orient_closed(const std::vector<Vec3>& points, std::vector<Triangle>& triangles,
                    OrientReport* report = nullptr);
 
-} // namespace gewebe
+} // namespace gewebe::repair

@@ -11,18 +11,18 @@
 #include <numeric>
 #include <unordered_map>
 
-namespace gewebe {
+namespace gewebe::repair {
 namespace {
 
 using Part = std::span<const std::int32_t>;
 
 /// Calls visit(faces at it) for each edge; faces of different parts have no edge in common.
 template <class Visit>
-void for_each_edge(const EdgeSides& sides, Part part, const Visit& visit) {
-  std::vector<EdgeSide> sorted;
-  sides.for_each_edge([&](std::uint32_t, std::span<const EdgeSide> edge) {
-    const auto part_of = [&](const EdgeSide& side) { return part[side.face()]; };
-    if (part.empty() || std::ranges::all_of(edge, [&](const EdgeSide& side) {
+void for_each_edge(const mesh::EdgeSides& sides, Part part, const Visit& visit) {
+  std::vector<mesh::EdgeSide> sorted;
+  sides.for_each_edge([&](std::uint32_t, std::span<const mesh::EdgeSide> edge) {
+    const auto part_of = [&](const mesh::EdgeSide& side) { return part[side.face()]; };
+    if (part.empty() || std::ranges::all_of(edge, [&](const mesh::EdgeSide& side) {
           return part_of(side) == part_of(edge[0]);
         })) {
       visit(edge);
@@ -33,7 +33,7 @@ void for_each_edge(const EdgeSides& sides, Part part, const Visit& visit) {
     for (std::size_t begin = 0, end = 0; begin < sorted.size(); begin = end) {
       while (end < sorted.size() && part_of(sorted[end]) == part_of(sorted[begin]))
         ++end;
-      visit(std::span<const EdgeSide>(sorted).subspan(begin, end - begin));
+      visit(std::span<const mesh::EdgeSide>(sorted).subspan(begin, end - begin));
     }
   });
 }
@@ -58,8 +58,9 @@ void drop_repeated(std::size_t points, OrientedSurface& surface, std::vector<std
   };
   surface.source.resize(faces.size());
   std::iota(surface.source.begin(), surface.source.end(), 0U);
-  keep_only([&](std::size_t n) { return !has_equal_corners(faces[n]); });
-  const std::vector<bool> repeated = repeated_faces(points, faces, SameFace::orientation, part);
+  keep_only([&](std::size_t n) { return !mesh::has_equal_corners(faces[n]); });
+  const std::vector<bool> repeated =
+      mesh::repeated_faces(points, faces, mesh::SameFace::orientation, part);
   surface.triangles_duplicate = static_cast<std::uint64_t>(std::ranges::count(repeated, true));
   if (surface.triangles_duplicate > 0)
     keep_only([&](std::size_t n) { return !repeated[n]; });
@@ -73,8 +74,8 @@ void agree(std::span<const Vec3> points, Part part, OrientedSurface& surface) {
   };
   std::vector<std::array<Neighbour, 3>> neighbours(surface.triangles.size());
   std::vector<std::uint8_t> count(surface.triangles.size(), 0);
-  const EdgeSides sides(points.size(), surface.triangles);
-  for_each_edge(sides, part, [&](std::span<const EdgeSide> edge) {
+  const mesh::EdgeSides sides(points.size(), surface.triangles);
+  for_each_edge(sides, part, [&](std::span<const mesh::EdgeSide> edge) {
     if (edge.size() != 2)
       return;
     const std::uint32_t a = edge[0].face(), b = edge[1].face();
@@ -123,12 +124,12 @@ void turn_outward(std::span<const Vec3> points, Part part, OrientedSurface& surf
     }
   };
   std::vector<Sum> sums(surface.triangles.size());
-  const EdgeSides sides(points.size(), surface.triangles);
+  const mesh::EdgeSides sides(points.size(), surface.triangles);
   std::vector<std::uint32_t> open; // a face of each edge that is
-  for_each_edge(sides, part, [&](std::span<const EdgeSide> edge) {
-    for (const EdgeSide& side : edge)
+  for_each_edge(sides, part, [&](std::span<const mesh::EdgeSide> edge) {
+    for (const mesh::EdgeSide& side : edge)
       groups.join(edge[0].face(), side.face());
-    if (surplus(edge) != 0)
+    if (mesh::surplus(edge) != 0)
       open.push_back(edge[0].face());
   });
   for (const std::uint32_t t : open)
@@ -250,7 +251,7 @@ OrientedSurface orient_surface(std::span<const Vec3> points, std::span<const Tri
   OrientedSurface surface;
   surface.triangles.assign(triangles.begin(), triangles.end());
   std::vector<std::int32_t> parts(part.begin(), part.end());
-  const std::vector<std::uint32_t> first = first_at_position(points);
+  const std::vector<std::uint32_t> first = mesh::first_at_position(points);
   for (Triangle& t : surface.triangles)
     for (std::uint32_t& corner : t)
       corner = first[corner];
@@ -262,9 +263,9 @@ OrientedSurface orient_surface(std::span<const Vec3> points, std::span<const Tri
 
 ClosingCones closing_cones(std::vector<Vec3>& points, std::span<const Triangle> triangles) {
   std::vector<std::array<std::uint32_t, 2>> missing; // from, to: what would balance the edges
-  EdgeSides(points.size(), triangles)
-      .for_each_edge([&](std::uint32_t low, std::span<const EdgeSide> edge) {
-        int up = surplus(edge);
+  mesh::EdgeSides(points.size(), triangles)
+      .for_each_edge([&](std::uint32_t low, std::span<const mesh::EdgeSide> edge) {
+        int up = mesh::surplus(edge);
         for (; up > 0; --up)
           missing.push_back({edge[0].high(), low});
         for (; up < 0; ++up)
@@ -291,4 +292,4 @@ ClosingCones closing_cones(std::vector<Vec3>& points, std::span<const Triangle> 
   return result;
 }
 
-} // namespace gewebe
+} // namespace gewebe::repair

@@ -8,7 +8,7 @@
 #include <span>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::repair {
 
 struct OrientedSurface {
   std::vector<Triangle> triangles;    ///< corners are the first points at their positions
@@ -38,4 +38,4 @@ struct ClosingCones {
 /// surface is closed. \pre equal positions have equal indices in `triangles`
 ClosingCones closing_cones(std::vector<Vec3>& points, std::span<const Triangle> triangles);
 
-} // namespace gewebe
+} // namespace gewebe::repair

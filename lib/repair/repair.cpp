@@ -19,7 +19,7 @@
 #include <unordered_map>
 #include <utility>
 
-namespace gewebe {
+namespace gewebe::repair {
 
 namespace {
 
@@ -92,7 +92,7 @@ void weld_near(TriangleMesh& mesh, double distance, RepairReport& report) {
   if (of_part.size() < 2)
     return;
   label.assign(mesh.points.size(), 0);
-  gather(mesh.points, border_points(mesh.points.size(), mesh.triangles), label, distance);
+  gather(mesh.points, mesh::border_points(mesh.points.size(), mesh.triangles), label, distance);
   join(Weld::borders);
 }
 
@@ -109,7 +109,7 @@ void drop_marked(std::vector<T>& values, const std::vector<bool>& marked) {
 
 void drop_duplicates(TriangleMesh& mesh, RepairReport& report) {
   const std::vector<bool> repeated =
-      repeated_faces(mesh.points.size(), mesh.triangles, SameFace::corners);
+      mesh::repeated_faces(mesh.points.size(), mesh.triangles, mesh::SameFace::corners);
   report.duplicate_faces = static_cast<std::uint64_t>(std::ranges::count(repeated, true));
   if (report.duplicate_faces == 0)
     return;
@@ -132,9 +132,9 @@ void turn(TriangleMesh& mesh, std::uint32_t face) {
 /// parts are no cavities.
 void orient(TriangleMesh& mesh, RepairReport& report) {
   DisjointSets sets(mesh.triangles.size());
-  EdgeSides(mesh.points.size(), mesh.triangles)
-      .for_each_edge([&](std::uint32_t, std::span<const EdgeSide> edge) {
-        for (const EdgeSide& side : edge)
+  mesh::EdgeSides(mesh.points.size(), mesh.triangles)
+      .for_each_edge([&](std::uint32_t, std::span<const mesh::EdgeSide> edge) {
+        for (const mesh::EdgeSide& side : edge)
           sets.join(edge[0].face(), side.face());
       });
   std::vector<std::uint32_t> connected;
@@ -267,4 +267,4 @@ RepairReport repair_mesh(TriangleMesh& mesh, const RepairOptions& options, const
   return report;
 }
 
-} // namespace gewebe
+} // namespace gewebe::repair

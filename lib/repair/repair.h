@@ -10,7 +10,7 @@
 #include <string_view>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::repair {
 
 /// Repairs to do, in the order in which they are done. Nothing else is changed.
 struct RepairOptions {
@@ -87,4 +87,4 @@ struct RepairReport {
 /// Cancelled
 RepairReport repair_mesh(TriangleMesh& mesh, const RepairOptions& options, const Context& context);
 
-} // namespace gewebe
+} // namespace gewebe::repair

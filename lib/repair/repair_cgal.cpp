@@ -114,14 +114,14 @@ private:
     std::vector<Triangle> faces;
     std::vector<std::uint32_t> source;
     for (std::uint32_t t = 0; t < mesh_.triangles.size(); ++t) {
-      if (has_equal_corners(mesh_.triangles[t]))
+      if (mesh::has_equal_corners(mesh_.triangles[t]))
         continue;
       faces.push_back(mesh_.triangles[t]);
       source.push_back(t);
     }
-    edges_ = edge_table(mesh_.triangles, mesh_.points.size());
-    const Sheets sheets = gewebe::cut_into_sheets(mesh_.points.size(), faces);
-    const HalfEdges links = half_edges(sheets.origin.size(), sheets.triangles);
+    edges_ = mesh::edge_table(mesh_.triangles, mesh_.points.size());
+    const mesh::Sheets sheets = gewebe::mesh::cut_into_sheets(mesh_.points.size(), faces);
+    const mesh::HalfEdges links = mesh::half_edges(sheets.origin.size(), sheets.triangles);
 
     origin_ = surface_.add_property_map<Vertex, std::uint32_t>("v:origin", none).first;
     for (std::uint32_t p = 0; p < sheets.origin.size(); ++p) {
@@ -157,7 +157,7 @@ private:
   bool is_seam(Halfedge h) const {
     const auto [low, high] = std::minmax(origin_[surface_.source(h)], origin_[surface_.target(h)]);
     const std::size_t edge = edges_.find({low, high});
-    return edge != EdgeTable::no_edge && edges_.around(edge).size() > 1;
+    return edge != mesh::EdgeTable::no_edge && edges_.around(edge).size() > 1;
   }
 
   std::uint64_t flat_faces() const {
@@ -350,7 +350,7 @@ private:
     }
     if (keep_collapsed)
       for (std::uint32_t t = 0; t < mesh_.triangles.size(); ++t) {
-        if (has_equal_corners(mesh_.triangles[t]))
+        if (mesh::has_equal_corners(mesh_.triangles[t]))
           out.push_back({t, t, mesh_.triangles[t]});
       }
     std::stable_sort(out.begin(), out.end(),
@@ -413,7 +413,7 @@ private:
 
   TriangleMesh& mesh_;
   RepairReport& report_;
-  EdgeTable edges_; ///< of the mesh
+  mesh::EdgeTable edges_; ///< of the mesh
   Surface surface_;
   Surface::Property_map<Vertex, std::uint32_t> origin_; ///< point of the mesh, or none
   Surface::Property_map<Face, std::uint32_t> source_;   ///< face of the mesh, or none

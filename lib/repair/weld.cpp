@@ -8,7 +8,7 @@
 #include <bit>
 #include <functional>
 
-namespace gewebe {
+namespace gewebe::repair {
 namespace {
 
 // From (position, part) to the first point seen there. Open addressing, at most half full.
@@ -74,7 +74,7 @@ std::uint64_t join_borders(const TriangleMesh& mesh, DisjointSets& sets) {
   for (Triangle& t : joined_so_far)
     for (std::uint32_t& corner : t)
       corner = sets.find(corner);
-  const std::vector<std::uint32_t> border = border_points(mesh.points.size(), joined_so_far);
+  const std::vector<std::uint32_t> border = mesh::border_points(mesh.points.size(), joined_so_far);
   PositionTable table(mesh.points, border.size());
   std::uint64_t joined = 0;
   for (const std::uint32_t p : border)
@@ -102,7 +102,7 @@ void shrink(std::vector<T>& values, std::size_t size) {
 std::uint64_t remove_degenerate(TriangleMesh& mesh) {
   std::size_t kept = 0;
   for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
-    if (has_equal_corners(mesh.triangles[t]))
+    if (mesh::has_equal_corners(mesh.triangles[t]))
       continue;
     keep(mesh.triangles, t, kept);
     keep(mesh.texcoords, t, kept);
@@ -172,4 +172,4 @@ WeldResult weld(TriangleMesh& mesh, const WeldOptions& options) {
   return result;
 }
 
-} // namespace gewebe
+} // namespace gewebe::repair

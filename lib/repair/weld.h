@@ -6,7 +6,7 @@
 #include <cstddef>
 #include <cstdint>
 
-namespace gewebe {
+namespace gewebe::repair {
 
 /// Which points at exactly equal position (-0 equals 0) become one.
 enum class Weld {
@@ -45,4 +45,4 @@ struct WeldResult {
 /// Welding again changes nothing. \pre check_mesh(mesh) passes
 WeldResult weld(TriangleMesh& mesh, const WeldOptions& options);
 
-} // namespace gewebe
+} // namespace gewebe::repair

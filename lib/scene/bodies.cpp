@@ -11,7 +11,7 @@
 #include <tuple>
 #include <utility>
 
-namespace gewebe::simulation {
+namespace gewebe::scene {
 
 namespace {
 
@@ -20,17 +20,17 @@ constexpr double implicit_step = 1.0 / 600; // s, default: a tenth of a frame
 
 } // namespace
 
-Model joined_model(const World& w, std::span<const std::size_t> parts,
-                   std::vector<std::size_t>& offset) {
-  Model all;
+model::Model joined_model(const World& w, std::span<const std::size_t> parts,
+                          std::vector<std::size_t>& offset) {
+  model::Model all;
   for (const std::size_t part : parts) {
-    const Model& from = w.now.objects[part].model();
+    const model::Model& from = w.now.objects[part].model();
     const auto base = static_cast<std::uint32_t>(all.nodes.size());
     offset.push_back(base);
     all.nodes.insert(all.nodes.end(), from.nodes.begin(), from.nodes.end());
     for (const auto& [node, mass] : *w.now.objects[part].hung)
       all.nodes[base + node].mass += mass;
-    for (Spring s : from.springs) {
+    for (model::Spring s : from.springs) {
       s.i += base;
       s.j += base;
       all.springs.push_back(s);
@@ -56,8 +56,8 @@ Model joined_model(const World& w, std::span<const std::size_t> parts,
   return all;
 }
 
-Model weighed_model(const Object& object) {
-  Model model = object.model();
+model::Model weighed_model(const Object& object) {
+  model::Model model = object.model();
   for (const auto& [node, mass] : *object.hung)
     model.nodes[node].mass += mass;
   return model;
@@ -66,7 +66,7 @@ Model weighed_model(const Object& object) {
 namespace {
 
 void add_ties(const World& w, const std::vector<std::size_t>& parts,
-              const std::vector<std::size_t>& offset, Model& all) {
+              const std::vector<std::size_t>& offset, model::Model& all) {
   for (const Tie& tie : w.now.ties) {
     const auto a = std::find(parts.begin(), parts.end(), tie.object);
     const auto b = std::find(parts.begin(), parts.end(), tie.other);
@@ -76,15 +76,19 @@ void add_ties(const World& w, const std::vector<std::size_t>& parts,
       return static_cast<std::uint32_t>(offset[static_cast<std::size_t>(part - parts.begin())]) +
              node;
     };
-    Spring s{
-        index(a, tie.node), index(b, tie.other_node), SpringKind::edge, tie.stiffness, 0, tie.rest};
-    const Node &m = all.nodes[s.i], &n = all.nodes[s.j];
-    const auto ratio = [&](const Node& node) {
+    model::Spring s{index(a, tie.node),
+                    index(b, tie.other_node),
+                    model::SpringKind::edge,
+                    tie.stiffness,
+                    0,
+                    tie.rest};
+    const model::Node &m = all.nodes[s.i], &n = all.nodes[s.j];
+    const auto ratio = [&](const model::Node& node) {
       return all.materials[static_cast<std::size_t>(node.material)].damping_ratio;
     };
-    const double mass = m.fixed == fixed_all   ? n.mass
-                        : n.fixed == fixed_all ? m.mass
-                                               : m.mass * (n.mass / (m.mass + n.mass));
+    const double mass = m.fixed == model::fixed_all   ? n.mass
+                        : n.fixed == model::fixed_all ? m.mass
+                                                      : m.mass * (n.mass / (m.mass + n.mass));
     s.damping = (ratio(m) + ratio(n)) * std::sqrt(s.stiffness * mass);
     if (s.i > s.j)
       std::swap(s.i, s.j);
@@ -98,21 +102,21 @@ double integration_step(World& w, Body& body) {
   const std::optional<double> wish = w.now.settings.timestep;
   if (moves_implicitly(w.now.objects[body.parts[0]]))
     return wish.value_or(implicit_step);
-  const double usual = safe_step_fraction * body.safe;
+  const double usual = dynamics::safe_step_fraction * body.safe;
   if (!wish)
     return usual;
   if (*wish <= body.safe)
     return *wish;
   if (!body.warned_step && w.options.warn)
     w.options.warn("object " + w.now.objects[body.parts[0]].name() + ": the timestep " +
-                   number_text(*wish) + " s is beyond the safe " + number_text(body.safe) +
-                   " s, it takes smaller ones");
+                   text::number_text(*wish) + " s is beyond the safe " +
+                   text::number_text(body.safe) + " s, it takes smaller ones");
   body.warned_step = true;
   return usual;
 }
 
 void load_body(const World& w, Body& body) {
-  Load load;
+  contact::Load load;
   for (const std::size_t part : body.parts) {
     const Object& object = w.now.objects[part];
     const auto add = [&](const auto& from, auto& all) {
@@ -142,27 +146,27 @@ void raise(const World& w, const Body& body) {
     std::rethrow_exception(body.failure);
   } catch (const Cancelled&) {
     throw;
-  } catch (const MotionError& error) {
+  } catch (const dynamics::MotionError& error) {
     const Object& object = w.now.objects[owner(error.node())];
-    throw Error("object " + object.name() + " at " + number_text(error.time()) + " s: node " +
+    throw Error("object " + object.name() + " at " + text::number_text(error.time()) + " s: node " +
                 std::to_string(error.node() - object.offset) + " " + error.what());
   } catch (const ObjectError&) { // of one beside it
     throw;
   } catch (const Error& error) {
     throw Error("object " + w.now.objects[body.parts[0]].name() + " at " +
-                number_text(w.now.clock.time) + " s: " + error.what());
+                text::number_text(w.now.clock.time) + " s: " + error.what());
   }
 }
 
-std::span<const NodeMotion> motion_of(const Object& object) {
+std::span<const dynamics::NodeMotion> motion_of(const Object& object) {
   return object.body->moving->motion().subspan(object.offset, object.model().nodes.size());
 }
 
 namespace {
 
 /// What moves a body of this model: by the steps of a solid if one of its parts is one.
-std::unique_ptr<BodyMotion> motion_for(const World& w, const std::vector<std::size_t>& parts,
-                                       const Model& model) {
+std::unique_ptr<dynamics::BodyMotion>
+motion_for(const World& w, const std::vector<std::size_t>& parts, const model::Model& model) {
   const auto solid =
       std::ranges::find_if(parts, [&](std::size_t part) { return is_solid(w.now.objects[part]); });
   const Object& object = w.now.objects[solid != parts.end() ? *solid : parts[0]];
@@ -174,10 +178,10 @@ std::unique_ptr<BodyMotion> motion_for(const World& w, const std::vector<std::si
       throw Error("object " + object.name() +
                   " moves by explicit steps, expected integration=implicit or auto for bulk=");
     if (!moves_implicitly(object))
-      return std::make_unique<Elastodynamic>(model);
+      return std::make_unique<dynamics::Elastodynamic>(model);
   }
   try {
-    return std::make_unique<SolidDynamic>(model, object.matter->solid, w.context);
+    return std::make_unique<dynamics::SolidDynamic>(model, object.matter->solid, w.context);
   } catch (const Cancelled&) {
     throw;
   } catch (const Error& error) {
@@ -192,7 +196,7 @@ Integration chosen_integration(const World& w, const Object& object) {
     return object.integration;
   const double wish = w.now.settings.timestep.value_or(implicit_step);
   const bool asks = object.matter->solid.bulk.has_value();
-  return !is_solid(object) && (asks || safe_step(object.model()) * worth_implicit < wish)
+  return !is_solid(object) && (asks || model::safe_step(object.model()) * worth_implicit < wish)
              ? Integration::implicit
              : Integration::semi_implicit;
 }
@@ -226,16 +230,17 @@ std::shared_ptr<Body> make_body(World& w, std::vector<std::size_t> parts, const 
   auto body = std::make_shared<Body>();
   std::vector<std::size_t> offset;
   if (parts.size() > 1) {
-    Model all = joined_model(w, parts, offset);
+    model::Model all = joined_model(w, parts, offset);
     add_ties(w, parts, offset, all);
-    body->model = std::make_shared<const Model>(std::move(all));
+    body->model = std::make_shared<const model::Model>(std::move(all));
   } else {
     offset.push_back(0);
     const Object& object = w.now.objects[parts[0]];
-    body->model = object.hung->empty() ? object.matter->model
-                                       : std::make_shared<const Model>(weighed_model(object));
+    body->model = object.hung->empty()
+                      ? object.matter->model
+                      : std::make_shared<const model::Model>(weighed_model(object));
   }
-  std::vector<NodeMotion> motion;
+  std::vector<dynamics::NodeMotion> motion;
   for (const std::size_t part : parts) {
     Object& object = w.now.objects[part];
     object.integration = chosen_integration(w, object);
@@ -243,14 +248,15 @@ std::shared_ptr<Body> make_body(World& w, std::vector<std::size_t> parts, const 
       motion.resize(motion.size() + object.model().nodes.size());
       continue;
     }
-    const std::span<const NodeMotion> from =
-        motions != nullptr ? std::span<const NodeMotion>(motions->at(part)) : motion_of(object);
+    const std::span<const dynamics::NodeMotion> from =
+        motions != nullptr ? std::span<const dynamics::NodeMotion>(motions->at(part))
+                           : motion_of(object);
     motion.insert(motion.end(), from.begin(), from.end());
   }
   const Object& first = w.now.objects[parts[0]];
   body->moving = motion_for(w, parts, *body->model);
   body->moving->set_motion(motion);
-  body->safe = moves_implicitly(first) ? HUGE_VAL : safe_step(*body->model);
+  body->safe = moves_implicitly(first) ? HUGE_VAL : model::safe_step(*body->model);
   for (std::size_t k = 0; k < parts.size(); ++k) {
     w.now.objects[parts[k]].body = body;
     w.now.objects[parts[k]].offset = offset[k];
@@ -267,7 +273,7 @@ void need_body(World& w, std::size_t object) {
   w.now.bodies.push_back(make_body(w, {object}));
 }
 
-void add_counts(SolidStepCounts& sum, const SolidStepCounts& more) {
+void add_counts(dynamics::SolidStepCounts& sum, const dynamics::SolidStepCounts& more) {
   sum.steps += more.steps;
   sum.rounds += more.rounds;
   sum.factors += more.factors;
@@ -284,7 +290,7 @@ void make_body_again(World& w, std::size_t object) {
   const std::shared_ptr<Body> before = w.now.objects[object].body;
   Motions motions;
   for (const std::size_t part : before->parts) {
-    const std::span<const NodeMotion> motion = motion_of(w.now.objects[part]);
+    const std::span<const dynamics::NodeMotion> motion = motion_of(w.now.objects[part]);
     motions[part].assign(motion.begin(), motion.end());
   }
   const std::shared_ptr<Body> next = make_body(w, before->parts, &motions);
@@ -297,7 +303,7 @@ void make_implicit(World& w, std::shared_ptr<Body>& body) {
   Motions motions;
   for (const std::size_t part : before->parts) {
     Object& object = w.now.objects[part];
-    const std::span<const NodeMotion> motion = motion_of(object);
+    const std::span<const dynamics::NodeMotion> motion = motion_of(object);
     motions[part].assign(motion.begin(), motion.end());
     object.integration = Integration::implicit;
   }
@@ -416,4 +422,4 @@ void Rule<Attach>::log(const World&, const Attach& c, ChangeRow& row) {
   row.value = c.stiffness;
 }
 
-} // namespace gewebe::simulation
+} // namespace gewebe::scene

@@ -17,7 +17,7 @@
 #include <variant>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::scene {
 
 enum class Method { ffe, ela }; ///< elastostatic (with stored stiffness), elastodynamic
 
@@ -42,7 +42,7 @@ struct SetForce {
 struct SetPressure {
   std::size_t object = 0;
   std::vector<std::uint32_t> nodes;
-  NodePressure pressure; ///< 0 removes it
+  contact::NodePressure pressure; ///< 0 removes it
 };
 /// Adds a mass to each of the nodes.
 struct SetMass {
@@ -73,16 +73,16 @@ struct Release { ///< removes force, pressure, displacement and grasp of the nod
 /// Puts an instrument at a pose. A present instrument is replaced.
 struct SetInstrument {
   std::size_t instrument = 0; ///< instrument_count(): a new one, which exists once this is accepted
-  InstrumentShape shape;      ///< radius > 0, friction >= 0
-  Pose pose;                  ///< turn of length 1
-  std::string name{};         ///< of a new instrument; unique
+  contact::InstrumentShape shape; ///< radius > 0, friction >= 0
+  contact::Pose pose;             ///< turn of length 1
+  std::string name{};             ///< of a new instrument; unique
 };
 /// Moves an instrument from its present pose to another one.
 struct MoveInstrument {
   std::size_t instrument = 0;
   Vec3 place;
-  std::optional<Quaternion> turn; ///< of length 1; empty: unchanged
-  double duration = 0;            ///< of the motion, s
+  std::optional<contact::Quaternion> turn; ///< of length 1; empty: unchanged
+  double duration = 0;                     ///< of the motion, s
 };
 /// Lets an instrument grasp nodes: they move with it rigidly from now on.
 struct Grasp {
@@ -94,7 +94,7 @@ struct Grasp {
 /// coupling the instrument follows its prescribed motion directly.
 struct SetCoupling {
   std::size_t instrument = 0;
-  std::optional<Coupling> coupling;
+  std::optional<contact::Coupling> coupling;
 };
 /// Removes an instrument and releases the nodes that it grasps.
 struct Withdraw {
@@ -115,10 +115,11 @@ struct SetTimestep {
 /// Starts the two-step method for an elastostatic object.
 struct SetTwoStep {
   std::size_t object = 0;
-  TwoStepOptions options;
-  std::function<std::shared_ptr<ComplianceSource>()> second; ///< called once for an object
+  statics::TwoStepOptions options;
+  std::function<std::shared_ptr<compliance::ComplianceSource>()>
+      second; ///< called once for an object
   /// Instead of `second`: the object's first model with other stiffnesses. It follows cuts.
-  std::shared_ptr<const Model> model{};
+  std::shared_ptr<const model::Model> model{};
 };
 /// Starts large rotations of an elastostatic solid, see statics/warped_statics.h.
 struct SetWarp {
@@ -150,7 +151,7 @@ struct SpringsToCut {
 };
 /// Severs everything that a plane intersects, of all nodes or of the given ones.
 struct PlaneToCut {
-  CutPlane plane;
+  cutting::CutPlane plane;
   std::optional<std::vector<std::uint32_t>> nodes;
   bool along_faces = false; ///< of a solid: no tetrahedron is cut through
 };
@@ -164,7 +165,7 @@ struct CutObject {
 struct SetTear {
   std::size_t object = 0;
   double strain = 0;
-  TearLimit limit{}; ///< of a solid
+  cutting::TearLimit limit{}; ///< of a solid
 };
 /// Restores an object's first model. Parts that have come off stay objects of their own.
 struct Restore {
@@ -177,8 +178,8 @@ using Change =
 
 /// Columns of a log row that only instruments have. What does not apply stays empty.
 struct InstrumentRow {
-  std::optional<Vec3> end;        ///< second end of its axis
-  std::optional<Quaternion> turn; ///< rotation from its first orientation
+  std::optional<Vec3> end;                 ///< second end of its axis
+  std::optional<contact::Quaternion> turn; ///< rotation from its first orientation
   std::optional<Vec3> force, torque;
   std::optional<std::uint64_t> nodes; ///< number of nodes that it touches or grasps
   std::optional<Vec3> hand;           ///< position of the hand, of a coupled instrument
@@ -197,4 +198,4 @@ struct ChangeRow {
   InstrumentRow instrument{};
 };
 
-} // namespace gewebe
+} // namespace gewebe::scene

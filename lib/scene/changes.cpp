@@ -5,7 +5,7 @@
 #include <cmath>
 #include <variant>
 
-namespace gewebe::simulation {
+namespace gewebe::scene {
 
 namespace {
 
@@ -25,7 +25,7 @@ void log_names(const World& w, const Kind& c, ChangeRow& row) {
 }
 
 void displace(const World& w, Object& object, const SetDisplacement& set) {
-  Load& load = object.load.write();
+  contact::Load& load = object.load.write();
   for (const std::uint32_t node : set.nodes) {
     Vec3 from;
     if (object.body != nullptr)
@@ -94,7 +94,7 @@ ChangeRow row_of(const World& w, const Change& change) {
 void require_period(double period) {
   constexpr double min = 1e-9; // s
   if (!(period >= min))
-    throw Error("a period of " + number_text(period) + " s, expected 1e-9 s or longer");
+    throw Error("a period of " + text::number_text(period) + " s, expected 1e-9 s or longer");
 }
 
 // ---- loads
@@ -105,7 +105,7 @@ void Rule<SetForce>::check(World&, const SetForce& c) {
 }
 void Rule<SetForce>::apply(World& w, const SetForce& c) {
   Object& object = w.now.objects.at(c.object);
-  Load& load = object.load.write();
+  contact::Load& load = object.load.write();
   for (const std::uint32_t node : c.nodes) {
     load.force_period.erase(node);
     if (c.force == Vec3{}) {
@@ -130,7 +130,7 @@ void Rule<SetPressure>::check(World&, const SetPressure& c) {
 }
 void Rule<SetPressure>::apply(World& w, const SetPressure& c) {
   Object& object = w.now.objects.at(c.object);
-  Load& load = object.load.write();
+  contact::Load& load = object.load.write();
   for (const std::uint32_t node : c.nodes)
     if (c.pressure.pressure == 0)
       load.pressure.erase(node);
@@ -147,7 +147,7 @@ void Rule<SetPressure>::log(const World&, const SetPressure& c, ChangeRow& row) 
 void Rule<SetMass>::check(World& w, const SetMass& c) {
   need_model(w.now.objects.at(c.object));
   if (!(c.mass >= 0 && c.mass <= largest_number))
-    throw Error("a mass of " + number_text(c.mass) + " g, expected one from 0 to 1e38 g");
+    throw Error("a mass of " + text::number_text(c.mass) + " g, expected one from 0 to 1e38 g");
 }
 void Rule<SetMass>::apply(World& w, const SetMass& c) {
   Object& object = w.now.objects.at(c.object);
@@ -175,12 +175,12 @@ void Rule<SetDisplacement>::check(World& w, const SetDisplacement& c) {
   const double max = displacement_limit(object);
   for (int a = 0; a < 3; ++a)
     if (!(std::abs(c.displacement[a]) <= max))
-      throw Error("a displacement of " + number_text(c.displacement[a]) +
+      throw Error("a displacement of " + text::number_text(c.displacement[a]) +
                   " mm, expected at most a million times the size of the object, " +
-                  number_text(max) + " mm");
+                  text::number_text(max) + " mm");
   for (const std::uint32_t node : c.nodes)
     for (int a = 0; a < 3; ++a)
-      if (is_fixed(object.model(), node, a) && c.displacement[a] != 0)
+      if (contact::is_fixed(object.model(), node, a) && c.displacement[a] != 0)
         throw Error("node " + std::to_string(node) + " is fixed along " + "xyz"[a] +
                     ", expected a displacement of 0 there");
 }
@@ -199,7 +199,7 @@ void Rule<SetDisplacement>::log(const World&, const SetDisplacement& c, ChangeRo
 void Rule<Release>::apply(World& w, const Release& c) {
   Object& object = w.now.objects.at(c.object);
   drop_grips(w, c.object, c.nodes);
-  Load& load = object.load.write();
+  contact::Load& load = object.load.write();
   for (const std::uint32_t node : c.nodes) {
     load.force.erase(node);
     load.force_period.erase(node);
@@ -246,4 +246,4 @@ void Rule<Emit>::log(const World&, const Emit& c, ChangeRow& row) {
                            : "shapes";
 }
 
-} // namespace gewebe::simulation
+} // namespace gewebe::scene

@@ -7,7 +7,7 @@
 #include <algorithm>
 #include <utility>
 
-namespace gewebe::simulation {
+namespace gewebe::scene {
 
 namespace {
 
@@ -19,7 +19,7 @@ bool is_sum_of_forces(const World& w, std::size_t index) {
   if (object.method != Method::ffe || object.in_motion || object.warp || object.stages.options ||
       object.shown.deferred || !object.matter->known || has_law(object))
     return false;
-  const Load &load = *object.load, &shown = *object.shown.load;
+  const contact::Load &load = *object.load, &shown = *object.shown.load;
   if (!load.displacement.empty() || load.gravity != Vec3{} || !load.pressure.empty() ||
       !load.force_period.empty() || !shown.displacement.empty() || shown.force != load.force)
     return false;
@@ -36,7 +36,7 @@ std::shared_ptr<ContactReach> contact_reach(World& w, std::size_t index) {
   if (!is_sum_of_forces(w, index))
     return nullptr;
   Object& object = w.now.objects[index];
-  const NodeClusters* const clusters = solver_of(w, object).clusters();
+  const columns::NodeClusters* const clusters = solver_of(w, object).clusters();
   if (clusters == nullptr || std::ranges::any_of(object.load->force, [&](const auto& f) {
         return f.first >= clusters->node.size();
       }))
@@ -48,12 +48,12 @@ std::shared_ptr<ContactReach> contact_reach(World& w, std::size_t index) {
 }
 
 const std::vector<double>& bounds_under(World& w, std::size_t index, ContactReach& reach,
-                                        std::span<const NodalContactForce> contact) {
+                                        std::span<const contact::NodalContactForce> contact) {
   Object& object = w.now.objects[index];
   std::map<std::uint32_t, Vec3> all = object.load->force;
-  for (const NodalContactForce& f : contact)
+  for (const contact::NodalContactForce& f : contact)
     all[f.node] += f.force;
-  std::vector<NodeVector> forces;
+  std::vector<contact::NodeVector> forces;
   forces.reserve(all.size());
   for (const auto& [node, force] : all)
     forces.push_back({node, force});
@@ -73,7 +73,7 @@ Box3 contact_box(World& w, std::size_t index) {
     std::optional<Box3>& box = object.matter->box;
     if (!box) {
       box.emplace();
-      const std::size_t count = surface_count(object.model());
+      const std::size_t count = model::surface_count(object.model());
       for (std::size_t i = 0; i < count; ++i)
         box->add(object.model().nodes[i].position);
     }
@@ -114,4 +114,4 @@ PartIsland& part_island(IslandCache& whole, const std::shared_ptr<const ContactR
   return whole.parts.back();
 }
 
-} // namespace gewebe::simulation
+} // namespace gewebe::scene

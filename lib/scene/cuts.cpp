@@ -18,7 +18,7 @@
 #include <variant>
 #include <vector>
 
-namespace gewebe::simulation {
+namespace gewebe::scene {
 
 namespace {
 
@@ -26,15 +26,15 @@ constexpr double largest_turn = 0.1; ///< between two edges of a swept area, abo
 
 /// Stiffness of an elastostatic object that is updated after cuts; null if no solution was needed
 /// so far, or lately. The object after the cut takes it over.
-const CutStiffness* stiffness_of(World& w, Object& object) {
+const update::CutStiffness* stiffness_of(World& w, Object& object) {
   if (object.statics.stiffness || (!object.statics.made() && !has_moved(w, object)))
     return object.statics.stiffness.get();
-  const std::shared_ptr<const Model> first =
+  const std::shared_ptr<const model::Model> first =
       object.cut.first ? object.cut.first : object.matter->model;
-  std::shared_ptr<ComplianceSource> source;
+  std::shared_ptr<compliance::ComplianceSource> source;
   if (object.matter->source.stiffness)
     source = object.matter->source.stiffness(*first);
-  auto stiffness = std::make_shared<CutStiffness>(first, std::move(source), w.context);
+  auto stiffness = std::make_shared<update::CutStiffness>(first, std::move(source), w.context);
   if (object.cut.first)
     (void)stiffness->cut(object.matter->model, *object.cut.first_nodes, *object.cut.places);
   object.statics.stiffness = std::move(stiffness);
@@ -43,17 +43,18 @@ const CutStiffness* stiffness_of(World& w, Object& object) {
 
 /// Of a cut model, from the object as it was before; nothing: K is factorised when it is needed.
 /// Nodes of the object may be gone with a part (CutModel::place).
-std::shared_ptr<ComplianceSource>
-cut_source(World& w, Object& object, std::shared_ptr<const Model> next, const CutModel& cut) {
-  const CutStiffness* const before = stiffness_of(w, object);
+std::shared_ptr<compliance::ComplianceSource> cut_source(World& w, Object& object,
+                                                         std::shared_ptr<const model::Model> next,
+                                                         const cutting::CutModel& cut) {
+  const update::CutStiffness* const before = stiffness_of(w, object);
   if (before == nullptr)
     return nullptr;
   try {
-    auto stiffness = std::make_shared<CutStiffness>(*before);
-    const CutWork work = stiffness->cut(std::move(next), cut.origin, cut.place);
-    ++(work.way == CutWay::woodbury   ? w.now.counts.cut_woodbury
-       : work.way == CutWay::refactor ? w.now.counts.cut_refactors
-                                      : w.now.counts.cut_factors);
+    auto stiffness = std::make_shared<update::CutStiffness>(*before);
+    const update::CutWork work = stiffness->cut(std::move(next), cut.origin, cut.place);
+    ++(work.way == update::CutWay::woodbury   ? w.now.counts.cut_woodbury
+       : work.way == update::CutWay::refactor ? w.now.counts.cut_refactors
+                                              : w.now.counts.cut_factors);
     w.now.counts.cut_unprepared += work.unprepared ? 1 : 0;
     object.statics.stiffness = stiffness;
     return stiffness->compliance();
@@ -64,7 +65,8 @@ cut_source(World& w, Object& object, std::shared_ptr<const Model> next, const Cu
 }
 
 /// Where all nodes of a cut object go.
-Moves moves_of(const World& w, std::size_t index, const CutModel& cut, const FreeParts& free) {
+Moves moves_of(const World& w, std::size_t index, const cutting::CutModel& cut,
+               const cutting::FreeParts& free) {
   Moves moves;
   moves.objects = {index};
   for (std::size_t k = 0; k < free.parts.size(); ++k)
@@ -73,7 +75,7 @@ Moves moves_of(const World& w, std::size_t index, const CutModel& cut, const Fre
   ways.reserve(cut.origin.size());
   const auto add = [&](std::size_t object, std::uint32_t i, std::uint32_t c) {
     const std::uint32_t o = cut.origin[c];
-    const auto at = std::ranges::lower_bound(cut.between, c, {}, &CutModel::Between::node);
+    const auto at = std::ranges::lower_bound(cut.between, c, {}, &cutting::CutModel::Between::node);
     const bool between = at != cut.between.end() && at->node == c,
                fresh = between && cut.share[c] == 0;
     if (between)
@@ -101,13 +103,13 @@ CutState cut_again(const Object& old, std::vector<std::uint32_t> origin, const M
     for (std::uint32_t& o : origin)
       o = before[o];
   next.first_nodes = std::move(origin);
-  std::vector<std::uint32_t> places(next.first->nodes.size(), CutModel::gone);
+  std::vector<std::uint32_t> places(next.first->nodes.size(), cutting::CutModel::gone);
   for (std::uint32_t f = 0; f < places.size(); ++f) {
     const std::uint32_t before = old.cut.places->empty() ? f : (*old.cut.places)[f];
-    if (before == CutModel::gone)
+    if (before == cutting::CutModel::gone)
       continue;
     for (const Moves::To& to : moves.of(before))
-      if (to.object == moves.objects[0] && (to.main || places[f] == CutModel::gone))
+      if (to.object == moves.objects[0] && (to.main || places[f] == cutting::CutModel::gone))
         places[f] = to.node;
   }
   next.places = std::move(places);
@@ -133,12 +135,13 @@ bool may_cut(World& w, Object& object, Feature feature) {
 }
 
 /// \param cut of the object's model
-void carry_out(World& w, std::size_t index, CutModel cut) {
+void carry_out(World& w, std::size_t index, cutting::CutModel cut) {
   Object& old = w.now.objects[index];
   const bool ffe = old.method == Method::ffe;
-  FreeParts free = free_parts(old.model(), cut);
-  if (const SkinPartsReport skin = part_skin(cut.model, free); skin.torn > 0 && w.options.warn)
-    w.options.warn("object " + old.name() + " at " + number_text(w.now.clock.time) +
+  cutting::FreeParts free = cutting::free_parts(old.model(), cut);
+  if (const cutting::SkinPartsReport skin = cutting::part_skin(cut.model, free);
+      skin.torn > 0 && w.options.warn)
+    w.options.warn("object " + old.name() + " at " + text::number_text(w.now.clock.time) +
                    " s: what comes off tears its skin along " + std::to_string(skin.torn) +
                    " edges that no cut has passed");
   // Parts and instruments need the shape before the cut. Without them it may never be read.
@@ -158,14 +161,14 @@ void carry_out(World& w, std::size_t index, CutModel cut) {
                .doubled = cut.doubled,
                .time = w.now.clock.time,
                .text = {}};
-  CutModel rest = without_parts(std::move(cut), std::move(free.rest));
-  const auto now = std::make_shared<const Model>(std::move(rest.model));
-  std::shared_ptr<ComplianceSource> prepared;
+  cutting::CutModel rest = cutting::without_parts(std::move(cut), std::move(free.rest));
+  const auto now = std::make_shared<const model::Model>(std::move(rest.model));
+  std::shared_ptr<compliance::ComplianceSource> prepared;
   bool loose = !old.came.velocity.empty();
   if (ffe && !has_law(old)) {
     try {
       prepared = cut_source(w, old, now, rest);
-    } catch (const SingularStiffness&) {
+    } catch (const linalg::SingularStiffness&) {
       prepared.reset(); // the solver reports it when the shape is needed
       loose = true;
       if (velocity.empty()) // the factor may have followed the cut
@@ -199,7 +202,7 @@ void carry_out(World& w, std::size_t index, CutModel cut) {
   w.now.news.cuttings.push_back(told);
   for (std::size_t k = 0; k < free.parts.size(); ++k) {
     Object& part = pieces.emplace_back(
-        renumbered(old, std::make_shared<const Model>(std::move(free.parts[k].model))));
+        renumbered(old, std::make_shared<const model::Model>(std::move(free.parts[k].model))));
     part.method = Method::ela;
     part.stages = {};
     part.warp = false;
@@ -222,8 +225,8 @@ void announce_cut(World& w, std::size_t index) {
   if (object.method != Method::ffe || has_law(object) || gap_of(object, Feature::cut) != nullptr)
     return;
   try {
-    if (const CutStiffness* const before = stiffness_of(w, object); before != nullptr) {
-      auto stiffness = std::make_shared<CutStiffness>(*before);
+    if (const update::CutStiffness* const before = stiffness_of(w, object); before != nullptr) {
+      auto stiffness = std::make_shared<update::CutStiffness>(*before);
       stiffness->prepare();
       object.statics.stiffness = std::move(stiffness);
     }
@@ -240,7 +243,7 @@ void announce_cut(World& w, std::size_t index) {
 void find_deferred_shape(World& w, Object& object) {
   const std::shared_ptr<const DeferredShape> held = object.shown.deferred;
   const DeferredShape& deferred = *held;
-  Elastostatic solver(*deferred.model, nullptr, w.context);
+  statics::Elastostatic solver(*deferred.model, nullptr, w.context);
   solver.update(deferred.load);
   const std::span<const double> first = solver.displacement();
   std::vector<double> shape(first.begin(), first.end());
@@ -264,14 +267,16 @@ std::vector<BladeArea> swept_areas(World& w) {
     if (!i.present || !i.shape.blade)
       continue;
     for (std::size_t k = 1; k < i.path.size(); ++k) {
-      const Pose &from = i.path[k - 1], &to = i.path[k];
-      const double turn = norm(rotated(from.turn, i.shape.axis) - rotated(to.turn, i.shape.axis)) /
+      const contact::Pose &from = i.path[k - 1], &to = i.path[k];
+      const double turn = norm(contact::rotated(from.turn, i.shape.axis) -
+                               contact::rotated(to.turn, i.shape.axis)) /
                           std::max(norm(i.shape.axis), 1e-300);
       const auto parts =
           static_cast<std::size_t>(std::clamp(std::ceil(turn / largest_turn), 1.0, 64.0));
-      Pose last = from;
+      contact::Pose last = from;
       for (std::size_t p = 1; p <= parts; ++p) {
-        const Pose next = between(from, to, static_cast<double>(p) / static_cast<double>(parts));
+        const contact::Pose next =
+            contact::between(from, to, static_cast<double>(p) / static_cast<double>(parts));
         areas.push_back({n, {last.place, last(i.shape.axis), next(i.shape.axis), next.place}});
         last = next;
       }
@@ -288,7 +293,7 @@ void sweep_blades(World& w) {
   const std::vector<BladeArea> areas = swept_areas(w);
   if (areas.empty())
     return;
-  std::vector<SweptQuad> quads;
+  std::vector<cutting::SweptQuad> quads;
   for (const BladeArea& area : areas)
     quads.push_back(area.corners);
   const std::uint64_t cuts = w.now.counts.cuts;
@@ -305,15 +310,16 @@ void sweep_blades(World& w) {
     std::vector<double> moved;
     std::span<const double> shape = *object.shown.displacement;
     if (object.body != nullptr) {
-      for (const NodeMotion& m : motion_of(object))
+      for (const dynamics::NodeMotion& m : motion_of(object))
         moved.insert(moved.end(), {m.displacement.x, m.displacement.y, m.displacement.z});
       shape = moved;
     }
-    const Cut swept = swept_cut(object.model(), shape, quads);
+    const cutting::Cut swept = cutting::swept_cut(object.model(), shape, quads);
     if ((swept.empty() && swept.sides.empty()) || !may_cut(w, object, Feature::blade))
       continue;
-    of_object(object.name() + " at " + number_text(w.now.clock.time) + " s", [&] {
-      CutModel cut = cut_model(object.model(), merged(swept, object.cut.scored));
+    of_object(object.name() + " at " + text::number_text(w.now.clock.time) + " s", [&] {
+      cutting::CutModel cut =
+          cutting::cut_model(object.model(), cutting::merged(swept, object.cut.scored));
       if (cut.changed()) {
         carry_out(w, index, std::move(cut));
         return;
@@ -335,10 +341,10 @@ void require_held(World& w, Object& object) {
     update_solver(w, object, acting_at(object, w.now.clock.time));
   } catch (const Cancelled&) {
     throw;
-  } catch (const SingularStiffness&) {
+  } catch (const linalg::SingularStiffness&) {
     throw;
   } catch (const Error& error) { // of the factor with these nodes held
-    throw SingularStiffness(error.what());
+    throw linalg::SingularStiffness(error.what());
   }
 }
 
@@ -361,7 +367,7 @@ void find_free_motion(World& w, std::size_t index) {
     else if (solver_of(w, object).is_free())
       require_held(w, object);
     return;
-  } catch (const SingularStiffness& error) {
+  } catch (const linalg::SingularStiffness& error) {
     w.now.news.cuttings.push_back({.kind = Cutting::Kind::loose,
                                    .object = index,
                                    .nodes = object.model().nodes.size(),
@@ -369,13 +375,13 @@ void find_free_motion(World& w, std::size_t index) {
                                    .text = error.what()});
   }
   if (w.options.warn)
-    w.options.warn("object " + object.name() + " at " + number_text(w.now.clock.time) +
+    w.options.warn("object " + object.name() + " at " + text::number_text(w.now.clock.time) +
                    " s: it goes on elastodynamic, for behind the cut " +
                    w.now.news.cuttings.back().text);
   if (object.shown.deferred)
     shape_in_step(w, object);
   Motions motions;
-  std::vector<NodeMotion>& motion = motions[index];
+  std::vector<dynamics::NodeMotion>& motion = motions[index];
   motion.resize(object.model().nodes.size());
   for (std::size_t i = 0; i < motion.size(); ++i) {
     motion[i].displacement = vector_at(*object.shown.displacement, i);
@@ -394,28 +400,29 @@ void Rule<CutObject>::apply(World& w, const CutObject& c) {
   Object& object = w.now.objects.at(c.object);
   need_model(object);
   require_support(w, object, Feature::cut);
-  CutModel cut = of_object(object.name(), [&] {
+  cutting::CutModel cut = of_object(object.name(), [&] {
     if (is_solid(object)) {
       const auto* const plane = std::get_if<PlaneToCut>(&c.what);
       if (plane == nullptr)
         throw Error("it has tetrahedra and no springs, expected a plane to cut it, or a blade");
       return plane_through(w, c.object, *plane);
     }
-    Cut what;
+    cutting::Cut what;
     if (const auto* const springs = std::get_if<SpringsToCut>(&c.what)) {
-      what = springs_between(object.model(), springs->from, springs->to);
+      what = cutting::springs_between(object.model(), springs->from, springs->to);
     } else {
       const auto& plane = std::get<PlaneToCut>(c.what);
       if (plane.along_faces)
         throw Error("it has no tetrahedra, expected a solid for along=faces");
-      what = plane_cut(object.model(), plane.plane,
-                       plane.nodes ? std::span<const std::uint32_t>(*plane.nodes)
-                                   : std::span<const std::uint32_t>());
+      what = cutting::plane_cut(object.model(), plane.plane,
+                                plane.nodes ? std::span<const std::uint32_t>(*plane.nodes)
+                                            : std::span<const std::uint32_t>());
     }
-    CutModel result = cut_model(object.model(), merged(what, object.cut.scored));
+    cutting::CutModel result =
+        cutting::cut_model(object.model(), cutting::merged(what, object.cut.scored));
     if (!result.changed())
       throw Error("nothing comes apart, expected edges that meet, or springs without a triangle");
-    require_held(object.model(), result);
+    cutting::require_held(object.model(), result);
     return result;
   });
   carry_out(w, c.object, std::move(cut));
@@ -433,8 +440,8 @@ void Rule<CutObject>::log(const World&, const CutObject& c, ChangeRow& row) {
   row.nodes = plane.nodes.value_or(std::vector<std::uint32_t>{});
   row.vector = plane.plane.point;
   const Vec3& n = plane.plane.normal;
-  row.text = "plane " + number_text(n.x) + " " + number_text(n.y) + " " + number_text(n.z) +
-             (plane.along_faces ? " along=faces" : "");
+  row.text = "plane " + text::number_text(n.x) + " " + text::number_text(n.y) + " " +
+             text::number_text(n.z) + (plane.along_faces ? " along=faces" : "");
 }
 
 namespace {
@@ -442,17 +449,17 @@ namespace {
 /// Where nodes of a solid as it came stand that have been moved since, in what is left of it.
 std::vector<Moves::Between> back_between(const Object& old, std::size_t index) {
   constexpr double there = 1e-9; // of an element's size: what of it is still there
-  const Model &first = *old.cut.first, &now = old.model();
+  const model::Model &first = *old.cut.first, &now = old.model();
   std::vector<Moves::Between> between;
-  std::optional<TetMesh> mesh;
+  std::optional<tetrahedra::TetMesh> mesh;
   for (std::uint32_t f = 0; f < first.nodes.size(); ++f) {
     const std::uint32_t i = (*old.cut.places)[f];
     const Vec3& place = first.nodes[f].position;
-    if (i == CutModel::gone || now.nodes[i].position == place)
+    if (i == cutting::CutModel::gone || now.nodes[i].position == place)
       continue;
     if (!mesh)
-      mesh = element_mesh(now);
-    const SolidPlace found = find_place(*mesh, place);
+      mesh = fem::element_mesh(now);
+    const embedding::SolidPlace found = embedding::find_place(*mesh, place);
     if (!(found.outside <= there * norm(now.nodes[i].position - place)))
       continue;
     Moves::Between b{index, f, false, {}};
@@ -497,4 +504,4 @@ void Rule<Restore>::apply(World& w, const Restore& c) {
   let_instruments_enter(w);
 }
 
-} // namespace gewebe::simulation
+} // namespace gewebe::scene

@@ -6,18 +6,18 @@
 #include <algorithm>
 #include <cmath>
 
-namespace gewebe::simulation {
+namespace gewebe::scene {
 
 Extent extent_of(const Object& object) {
   Extent all;
-  const std::vector<Node>& nodes = object.model().nodes;
-  const std::size_t count = surface_count(object.model());
+  const std::vector<model::Node>& nodes = object.model().nodes;
+  const std::size_t count = model::surface_count(object.model());
   if (object.body == nullptr) {
     for (std::size_t k = 0; k < count; ++k)
       all.box.add(nodes[k].position + vector_at(*object.shown.displacement, k));
     return all;
   }
-  const std::span<const NodeMotion> motion = motion_of(object);
+  const std::span<const dynamics::NodeMotion> motion = motion_of(object);
   for (std::size_t k = 0; k < count; ++k) {
     all.box.add(nodes[k].position + motion[k].displacement);
     all.speed = std::max(all.speed, dot(motion[k].velocity, motion[k].velocity));
@@ -40,4 +40,4 @@ const Extent& Extents::of(std::size_t index) {
   return kept.emplace(index, extent_of(object)).first->second;
 }
 
-} // namespace gewebe::simulation
+} // namespace gewebe::scene

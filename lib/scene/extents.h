@@ -8,7 +8,7 @@
 #include <cstddef>
 #include <map>
 
-namespace gewebe::simulation {
+namespace gewebe::scene {
 
 struct World;
 struct Object;
@@ -38,4 +38,4 @@ private:
   std::map<std::size_t, Extent> known_;
 };
 
-} // namespace gewebe::simulation
+} // namespace gewebe::scene

@@ -5,7 +5,7 @@
 #include <cstddef>
 #include <utility>
 
-namespace gewebe::simulation {
+namespace gewebe::scene {
 
 void Body::restore(const Snapshot& was) {
   changed = was.changed;
@@ -53,4 +53,4 @@ void roll_back(World& w, Snapshot&& snapshot) noexcept {
       object.shown.displacement.replace().assign(3 * object.model().nodes.size(), 0);
 }
 
-} // namespace gewebe::simulation
+} // namespace gewebe::scene

@@ -9,7 +9,7 @@
 #include <span>
 #include <utility>
 
-namespace gewebe::simulation {
+namespace gewebe::scene {
 
 namespace {
 
@@ -21,7 +21,7 @@ void require_single(std::initializer_list<Vec3> all, double radius) {
   for (const Vec3& v : all)
     radius = std::max({radius, std::abs(v.x), std::abs(v.y), std::abs(v.z)});
   if (!(radius <= largest_number))
-    throw Error("an instrument of or at " + number_text(radius) +
+    throw Error("an instrument of or at " + text::number_text(radius) +
                 " mm, expected numbers within single precision");
 }
 
@@ -38,8 +38,8 @@ void carry(World& w, const Instrument& instrument) {
   const double now = w.now.clock.time;
   for (const Instrument::Grip& grip : instrument.grips) {
     Object& object = w.now.objects[grip.object];
-    Load& load = object.load.write();
-    const Carrier by{instrument.way, grip.point, object.model().nodes[grip.node].position};
+    contact::Load& load = object.load.write();
+    const contact::Carrier by{instrument.way, grip.point, object.model().nodes[grip.node].position};
     const Vec3 to = by.at(instrument.way.end);
     load.displacement[grip.node] = to;
     load.ramp.erase(grip.node);
@@ -94,14 +94,14 @@ InstrumentReport report_of(const World& w, std::size_t instrument) {
     ++report.nodes;
   };
   for (const Object& object : w.now.objects)
-    for (const NodalContactForce& t : object.shown.contact)
+    for (const contact::NodalContactForce& t : object.shown.contact)
       if (t.instrument == instrument)
         add(object.model().nodes[t.node].position + contact_displacement(object, t.node), t.force);
   for (const Instrument::Grip& grip : i.grips) {
-    const std::vector<NodeVector>& forces = *w.now.objects[grip.object].shown.forces;
-    const auto f =
-        std::lower_bound(forces.begin(), forces.end(), grip.node,
-                         [](const NodeVector& v, std::uint32_t node) { return v.node < node; });
+    const std::vector<contact::NodeVector>& forces = *w.now.objects[grip.object].shown.forces;
+    const auto f = std::lower_bound(
+        forces.begin(), forces.end(), grip.node,
+        [](const contact::NodeVector& v, std::uint32_t node) { return v.node < node; });
     if (f != forces.end() && f->node == grip.node)
       add(report.pose(grip.point), f->value);
   }
@@ -116,8 +116,8 @@ namespace {
 void enter_from_outside(World& w, Instrument& i) {
   const auto number = static_cast<std::size_t>(&i - w.now.instruments.data());
   const double now = w.now.clock.time;
-  const PoseWay way = i.way;
-  const Pose start = entry_pose(w, i.shape, i.pose(now));
+  const contact::PoseWay way = i.way;
+  const contact::Pose start = entry_pose(w, i.shape, i.pose(now));
   if (i.coupled) { // its hand draws it back
     i.coupled->place = start.place;
     i.coupled->lag = way.at(now).place - start.place;
@@ -137,9 +137,9 @@ void enter_from_outside(World& w, Instrument& i) {
 
 /// Whether it is in an object by more than contact allows.
 bool stands_inside(World& w, const Instrument& i) {
-  InstrumentShape thinner = i.shape;
+  contact::InstrumentShape thinner = i.shape;
   thinner.radius *= 1 - allowed_depth;
-  const Pose pose = i.pose(w.now.clock.time);
+  const contact::Pose pose = i.pose(w.now.clock.time);
   return entry_pose(w, thinner, pose) != pose;
 }
 
@@ -169,16 +169,17 @@ void drop_grips(World& w, std::size_t object, const std::vector<std::uint32_t>& 
 void note_poses(World& w, std::optional<std::size_t> jumps) {
   if (w.now.instruments.empty())
     return;
-  std::vector<std::optional<Pose>> now; // of those that push
+  std::vector<std::optional<contact::Pose>> now; // of those that push
   for (Instrument& i : w.now.instruments) {
     now.push_back(i.present && !i.shape.blade ? std::optional(i.pose(w.now.clock.time))
                                               : std::nullopt);
     if (!i.present || !i.shape.blade)
       continue;
-    if (const Pose pose = i.way.at(w.now.clock.time); i.path.empty() || i.path.back() != pose)
+    if (const contact::Pose pose = i.way.at(w.now.clock.time);
+        i.path.empty() || i.path.back() != pose)
       i.path.push_back(pose);
   }
-  std::vector<std::vector<std::optional<Pose>>>& poses = w.now.poses;
+  std::vector<std::vector<std::optional<contact::Pose>>>& poses = w.now.poses;
   if (!poses.empty() && poses.back() == now)
     return;
   const std::size_t size = poses.size();
@@ -199,8 +200,8 @@ bool instruments_there(const World& w) {
   });
 }
 
-std::optional<Pose> pose_at(const World& w, std::size_t moment, std::size_t instrument) {
-  const std::vector<std::optional<Pose>>& all = w.now.poses[moment];
+std::optional<contact::Pose> pose_at(const World& w, std::size_t moment, std::size_t instrument) {
+  const std::vector<std::optional<contact::Pose>>& all = w.now.poses[moment];
   return instrument < all.size() ? all[instrument] : std::nullopt;
 }
 
@@ -208,7 +209,8 @@ std::optional<Pose> pose_at(const World& w, std::size_t moment, std::size_t inst
 
 void Rule<SetInstrument>::check(World&, const SetInstrument& c) {
   require_single({c.pose.place, c.shape.axis},
-                 c.shape.core ? std::max(c.shape.radius, reach_of(c.shape)) : c.shape.radius);
+                 c.shape.core ? std::max(c.shape.radius, contact::reach_of(c.shape))
+                              : c.shape.radius);
 }
 void Rule<SetInstrument>::enter(World& w, const SetInstrument& c) {
   if (c.instrument == w.now.instruments.size())
@@ -241,7 +243,7 @@ void Rule<SetInstrument>::log(const World&, const SetInstrument& c, ChangeRow& r
   row.what = "instrument";
   row.vector = c.pose.place;
   row.value = c.shape.radius;
-  row.text = instrument_kind_name(kind_of(c.shape));
+  row.text = contact::instrument_kind_name(contact::kind_of(c.shape));
   row.instrument.end = c.pose(c.shape.axis);
   row.instrument.turn = c.pose.turn;
 }
@@ -255,7 +257,7 @@ void Rule<MoveInstrument>::require(World& w, const MoveInstrument& c) {
 void Rule<MoveInstrument>::apply(World& w, const MoveInstrument& c) {
   Instrument& i = w.now.instruments[c.instrument];
   const double now = w.now.clock.time;
-  const Pose from = i.way.at(now);
+  const contact::Pose from = i.way.at(now);
   i.way = {from, {c.place, c.turn.value_or(from.turn)}, now, now + c.duration};
   carry(w, i);
   note_poses(w, c.duration > 0 ? std::nullopt : std::optional(c.instrument));
@@ -279,7 +281,7 @@ void Rule<SetCoupling>::require(World& w, const SetCoupling& c) {
 }
 void Rule<SetCoupling>::apply(World& w, const SetCoupling& c) {
   Instrument& i = w.now.instruments[c.instrument];
-  const Pose hand = i.way.at(w.now.clock.time);
+  const contact::Pose hand = i.way.at(w.now.clock.time);
   if (!c.coupling) { // at once to where the hand is
     i.coupled.reset();
   } else if (i.coupled) {
@@ -293,7 +295,7 @@ void Rule<SetCoupling>::log(const World&, const SetCoupling& c, ChangeRow& row) 
   row.what = "couple";
   if (c.coupling) {
     row.value = c.coupling->stiffness;
-    row.text = "damping " + number_text(c.coupling->damping);
+    row.text = "damping " + text::number_text(c.coupling->damping);
   } else {
     row.text = "off";
   }
@@ -303,7 +305,7 @@ void Rule<Grasp>::check(World& w, const Grasp& c) {
   Object& object = w.now.objects.at(c.object);
   need_model(object);
   for (const std::uint32_t node : c.nodes)
-    if (object.model().nodes[node].fixed != fixed_none)
+    if (object.model().nodes[node].fixed != model::fixed_none)
       throw Error("node " + std::to_string(node) +
                   " is fixed, expected nodes that can follow an instrument");
 }
@@ -326,8 +328,8 @@ void Rule<Grasp>::apply(World& w, const Grasp& c) {
   const std::span<const double> shape =
       inside ? whole_shape(w, object) : *object.shown.displacement;
   drop_grips(w, c.object, c.nodes);
-  const Pose pose = i.way.at(w.now.clock.time);
-  Load& load = object.load.write();
+  const contact::Pose pose = i.way.at(w.now.clock.time);
+  contact::Load& load = object.load.write();
   for (const std::uint32_t node : c.nodes) {
     const Vec3 u =
         object.body != nullptr ? motion_of(object)[node].displacement : vector_at(shape, node);
@@ -352,4 +354,4 @@ void Rule<Withdraw>::apply(World& w, const Withdraw& c) {
   note_poses(w);
 }
 
-} // namespace gewebe::simulation
+} // namespace gewebe::scene

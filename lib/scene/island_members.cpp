@@ -6,7 +6,7 @@
 #include <cmath>
 #include <string>
 
-namespace gewebe::simulation {
+namespace gewebe::scene {
 
 namespace {
 
@@ -14,14 +14,15 @@ constexpr std::size_t most_parts = 256;
 constexpr std::size_t kept_islands = 16;
 
 /// Forces on vertices as forces on nodes, sorted by node and cause.
-std::vector<NodalContactForce> nodal_forces(std::span<const contact::IslandMember::Force> forces,
-                                            std::span<const std::uint32_t> node,
-                                            std::span<const std::uint32_t> instrument_of_piece) {
-  std::vector<NodalContactForce> all;
+std::vector<contact::NodalContactForce>
+nodal_forces(std::span<const contact::IslandMember::Force> forces,
+             std::span<const std::uint32_t> node,
+             std::span<const std::uint32_t> instrument_of_piece) {
+  std::vector<contact::NodalContactForce> all;
   all.reserve(forces.size());
   for (const contact::IslandMember::Force& f : forces)
     all.push_back({node[f.vertex], instrument_of_piece[f.from], f.force});
-  return sums_of(std::move(all));
+  return contact::sums_of(std::move(all));
 }
 
 std::vector<contact::VertexForce>
@@ -54,12 +55,12 @@ contact::ContactBody& BodyMember::begin(double from, double to, const Context& c
 void BodyMember::end(std::span<const Force> forces, double h, const Context& context) {
   body_.moving->end_contact_step(vertex_sums(forces), clearing_, context);
   ++body_.taken;
-  const std::vector<NodalContactForce> all =
+  const std::vector<contact::NodalContactForce> all =
       nodal_forces(forces, surface_.node, instrument_of_piece_);
   for (const std::size_t part : body_.parts) {
     Object& object = w_.now.objects[part];
     object.touching.clear();
-    for (NodalContactForce f : all) {
+    for (contact::NodalContactForce f : all) {
       if (f.node < object.offset || f.node - object.offset >= object.model().nodes.size())
         continue;
       f.node -= static_cast<std::uint32_t>(object.offset);
@@ -73,10 +74,11 @@ void BodyMember::end(std::span<const Force> forces, double h, const Context& con
 
 // ---- elastostatic objects
 
-Load load_between(const Load& from, const Load& to, std::span<const double> shape, double part) {
+contact::Load load_between(const contact::Load& from, const contact::Load& to,
+                           std::span<const double> shape, double part) {
   if (part == 1)
     return to;
-  Load load = to;
+  contact::Load load = to;
   for (auto& [node, f] : load.force)
     f *= part;
   for (const auto& [node, f] : from.force)
@@ -101,14 +103,15 @@ StaticMember::StaticMember(World& w, std::size_t object, const contact::ModelSur
 std::vector<double> stood_shape(World& w, Object& object) {
   const std::span<const double> u = *object.shown.displacement;
   const bool inside = std::ranges::any_of(object.load->displacement, [&](const auto& entry) {
-    return axis_of(entry.first, 0) >= u.size();
+    return gewebe::axis_of(entry.first, 0) >= u.size();
   });
   const std::span<const double> shape = inside ? whole_shape_in_step(w, object) : u;
   return {shape.begin(), shape.end()};
 }
 
-void StaticMember::take_part(const SurfacePatch& part, const Load& begin,
-                             std::function<void(std::span<const NodalContactForce>)> check) {
+void StaticMember::take_part(
+    const statics::SurfacePatch& part, const contact::Load& begin,
+    std::function<void(std::span<const contact::NodalContactForce>)> check) {
   part_ = Part{&part, &begin, std::move(check), {}};
 }
 
@@ -136,7 +139,7 @@ contact::ContactBody& StaticMember::begin(double /*from*/, double to, const Cont
   else
     load_ = given_ ? *given_ : acting_at(object, to);
   std::vector<contact::VertexForce> last;
-  for (const NodalContactForce& f : object.touching) {
+  for (const contact::NodalContactForce& f : object.touching) {
     const auto found = std::ranges::lower_bound(surface_.node, f.node);
     if (found == surface_.node.end() || *found != f.node)
       continue; // its wall of a cut is gone
@@ -157,50 +160,54 @@ contact::ContactBody& StaticMember::begin(double /*from*/, double to, const Cont
     return *body;
   }
   if (part_) {
-    Load begin = *part_->begin;
-    for (const NodalContactForce& f : object.touching)
+    contact::Load begin = *part_->begin;
+    for (const contact::NodalContactForce& f : object.touching)
       begin.force[f.node] += f.force;
-    std::vector<NodeVector> forces;
+    std::vector<contact::NodeVector> forces;
     for (const auto& [node, force] : begin.force)
       forces.push_back({node, force});
-    const SurfacePatch& part = *part_->part;
+    const statics::SurfacePatch& part = *part_->part;
     part_->stood = solver_of(w_, object).displacement_of_clusters(part.clusters, forces);
-    body_ = std::make_unique<ElastostaticContactBody>(
-        StaticContactState{&object.model(), &surface_, &load_, part_->stood, part.place,
-                           std::move(last),
-                           [this, &object, &part](std::span<const double> u) {
-                             at_object(w_, object, [&] { require_bounded(object, u, part.node); });
-                           }},
-        [this, &object]() -> Elastostatic& { return solver_of(w_, object); }, part.clusters);
+    body_ = std::make_unique<statics::ElastostaticContactBody>(
+        statics::StaticContactState{
+            &object.model(), &surface_, &load_, part_->stood, part.place, std::move(last),
+            [this, &object, &part](std::span<const double> u) {
+              at_object(w_, object, [&] { require_bounded(object, u, part.node); });
+            }},
+        [this, &object]() -> statics::Elastostatic& { return solver_of(w_, object); },
+        part.clusters);
     return *body_;
   }
-  StaticContactState state{&object.model(),
-                           &surface_,
-                           &load_,
-                           *object.shown.displacement,
-                           {},
-                           std::move(last),
-                           [this, &object](std::span<const double> u) {
-                             at_object(w_, object, [&] { require_bounded(object, u); });
-                           }};
+  statics::StaticContactState state{&object.model(),
+                                    &surface_,
+                                    &load_,
+                                    *object.shown.displacement,
+                                    {},
+                                    std::move(last),
+                                    [this, &object](std::span<const double> u) {
+                                      at_object(w_, object, [&] { require_bounded(object, u); });
+                                    }};
   if (object.warp)
-    body_ = std::make_unique<WarpedContactBody>(
-        std::move(state), [this, &object]() -> WarpedStatics& { return warped_of(w_, object); });
+    body_ = std::make_unique<statics::WarpedContactBody>(
+        std::move(state),
+        [this, &object]() -> statics::WarpedStatics& { return warped_of(w_, object); });
   else if (object.stages.options)
-    body_ = std::make_unique<TwoStepContactBody>(
-        std::move(state), [this, &object]() -> std::pair<Elastostatic&, TwoStep&> {
-          Elastostatic& solver = solver_of(w_, object);
+    body_ = std::make_unique<statics::TwoStepContactBody>(
+        std::move(state),
+        [this, &object]() -> std::pair<statics::Elastostatic&, statics::TwoStep&> {
+          statics::Elastostatic& solver = solver_of(w_, object);
           return {solver, two_step_of(w_, object)};
         });
   else
-    body_ = std::make_unique<ElastostaticContactBody>(
-        std::move(state), [this, &object]() -> Elastostatic& { return solver_of(w_, object); });
+    body_ = std::make_unique<statics::ElastostaticContactBody>(
+        std::move(state),
+        [this, &object]() -> statics::Elastostatic& { return solver_of(w_, object); });
   return *body_;
 }
 
 void StaticMember::end(std::span<const Force> forces, double /*h*/, const Context& /*context*/) {
   Object& object = w_.now.objects[object_];
-  std::vector<NodalContactForce> touching =
+  std::vector<contact::NodalContactForce> touching =
       nodal_forces(forces, surface_.node, instrument_of_piece_);
   if (part_)
     part_->check(touching);
@@ -236,7 +243,7 @@ void StaticMember::end_part() {
     const Vec3 u = body_->displacement_of(v);
     shown.largest = std::max({shown.largest, std::abs(u.x), std::abs(u.y), std::abs(u.z)});
   }
-  for (const NodalContactForce& f : w_.now.objects[object_].touching)
+  for (const contact::NodalContactForce& f : w_.now.objects[object_].touching)
     shown.touched[f.node] = body_->displacement_of(static_cast<std::uint32_t>(
         std::ranges::lower_bound(surface_.node, f.node) - surface_.node.begin()));
 }
@@ -250,7 +257,8 @@ contact::ContactBody& InstrumentMember::begin(double from, double to, const Cont
   std::vector<contact::VertexForce> last;
   if (i.coupled) {
     hand_ = target_.place;
-    const CouplingStep step(i.coupled->coupling, i.coupled->lag, given_ ? duration_ : to - from);
+    const contact::CouplingStep step(i.coupled->coupling, i.coupled->lag,
+                                     given_ ? duration_ : to - from);
     compliance = step.compliance;
     target_.place = hand_ - step.free;
     last.push_back({0, i.coupled->force});
@@ -342,13 +350,13 @@ IslandCache& island_of(World& w, const IslandParts& parts) {
     keys.push_back({body->model, body->parts.size(), {}});
     for (const std::size_t part : body->parts) {
       object.emplace_back(part);
-      instrument.push_back(other_surface);
+      instrument.push_back(contact::other_surface);
     }
   }
   for (const std::size_t index : parts.statics) {
     keys.push_back({w.now.objects[index].matter->model, 1, {}});
     object.emplace_back(index);
-    instrument.push_back(other_surface);
+    instrument.push_back(contact::other_surface);
   }
   for (const std::size_t k : parts.instruments) {
     keys.push_back({nullptr, 1, w.now.instruments[k].shape});
@@ -410,7 +418,7 @@ IslandCache& island_of(World& w, const IslandParts& parts) {
 }
 
 void make_members(World& w, const IslandParts& parts, const IslandCache& island,
-                  std::span<const Pose> start, IslandMembers& members) {
+                  std::span<const contact::Pose> start, IslandMembers& members) {
   std::size_t model = 0;
   for (const auto& body : parts.bodies)
     members.all.push_back(
@@ -429,7 +437,7 @@ void fail_contact(const World& w, const IslandParts& parts, const Error& error) 
     names += (names.empty() ? "" : " ") + w.now.objects[index].name();
   for (const std::size_t k : parts.instruments)
     names += " " + w.now.instruments[k].name;
-  throw Error("contact of " + names + " at " + number_text(w.now.clock.time) +
+  throw Error("contact of " + names + " at " + text::number_text(w.now.clock.time) +
               " s is not solved: " + error.what() +
               (dynamic_cast<const contact::IntersectsAtStart*>(&error) != nullptr
                    ? ", expected surfaces that stand apart"
@@ -440,21 +448,23 @@ void count_contact(World& w, const contact::StepReport& report) {
   w.now.counts.contact.add(report);
 }
 
-Box3 box_between(const InstrumentShape& shape, const Pose& from, const Pose& to) {
-  Box3 box = PlacedInstrument(shape, from).box();
-  const Box3 there = PlacedInstrument(shape, to).box();
+Box3 box_between(const contact::InstrumentShape& shape, const contact::Pose& from,
+                 const contact::Pose& to) {
+  Box3 box = contact::PlacedInstrument(shape, from).box();
+  const Box3 there = contact::PlacedInstrument(shape, to).box();
   box.add(there.min);
   box.add(there.max);
   if (from.turn == to.turn)
     return box;
-  const double reach = reach_of(shape); // an end turns about the place
+  const double reach = contact::reach_of(shape); // an end turns about the place
   box.min -= Vec3{reach, reach, reach};
   box.max += Vec3{reach, reach, reach};
   return box;
 }
 
-std::size_t parts_of_way(const InstrumentShape& shape, const Pose& from, const Pose& to) {
-  const double parts = path_length(shape, from, to) / (instrument_step * shape.radius);
+std::size_t parts_of_way(const contact::InstrumentShape& shape, const contact::Pose& from,
+                         const contact::Pose& to) {
+  const double parts = contact::path_length(shape, from, to) / (instrument_step * shape.radius);
   return parts > 1
              ? static_cast<std::size_t>(std::min(std::ceil(parts), static_cast<double>(most_parts)))
              : 1;
@@ -465,4 +475,4 @@ bool takes_instruments(World& w, Object& object) {
   return !object.model().triangles.empty() && feels(w, object, Feature::touch);
 }
 
-} // namespace gewebe::simulation
+} // namespace gewebe::scene

@@ -19,7 +19,7 @@
 #include <utility>
 #include <vector>
 
-namespace gewebe::simulation {
+namespace gewebe::scene {
 
 /// Members of an island. Each list ascends.
 struct IslandParts {
@@ -42,11 +42,11 @@ struct HeldNode {
 /// Where contact of an elastostatic object is found on a part of its surface alone.
 struct ContactReach {
   contact::ModelSurface surface;
-  SurfaceTiles tiles;
-  std::vector<NodeVector> forces{}; ///< of `bounds`, see SurfaceTiles
+  statics::SurfaceTiles tiles;
+  std::vector<contact::NodeVector> forces{}; ///< of `bounds`, see SurfaceTiles
   std::vector<double> bounds{};
 
-  ContactReach(contact::ModelSurface&& of, const NodeClusters& clusters)
+  ContactReach(contact::ModelSurface&& of, const columns::NodeClusters& clusters)
       : surface(std::move(of)), tiles(surface, clusters) {}
   ContactReach(const ContactReach&) = delete;
   ContactReach& operator=(const ContactReach&) = delete;
@@ -57,7 +57,7 @@ struct ContactReach {
 std::shared_ptr<ContactReach> contact_reach(World& w, std::size_t index);
 /// Bounds of its displacements under some contact forces.
 const std::vector<double>& bounds_under(World& w, std::size_t index, ContactReach& reach,
-                                        std::span<const NodalContactForce> contact);
+                                        std::span<const contact::NodalContactForce> contact);
 /// Box that holds the surface of an elastostatic object, small enough to tell what is near it.
 Box3 contact_box(World& w, std::size_t index);
 /// Displacement of a node in contact.
@@ -67,16 +67,16 @@ Vec3 contact_displacement(const Object& object, std::uint32_t node);
 struct PartIsland {
   std::shared_ptr<const ContactReach> reach;
   std::vector<std::uint32_t> tiles;
-  SurfacePatch part;
+  statics::SurfacePatch part;
   std::unique_ptr<contact::IslandMotion> motion;
 };
 
 /// Cached surfaces of an island. They are valid while the models and instruments stay the same.
 struct IslandCache {
   struct Key {
-    std::shared_ptr<const Model> model;
+    std::shared_ptr<const model::Model> model;
     std::size_t parts = 1;
-    InstrumentShape shape{};
+    contact::InstrumentShape shape{};
     bool operator==(const Key& other) const {
       return model == other.model && parts == other.parts && shape.radius == other.shape.radius &&
              shape.axis == other.shape.axis && shape.core == other.shape.core;
@@ -127,13 +127,13 @@ public:
   contact::ContactBody& begin(double from, double to, const Context& context) override;
   void end(std::span<const Force> forces, double h, const Context& context) override;
   /// Replaces the load at the end of the step.
-  void set_load(Load load) { given_ = std::move(load); }
+  void set_load(contact::Load load) { given_ = std::move(load); }
   /// Replaces the time at that end, for what relaxes.
   void set_time(double time) { given_time_ = time; }
   /// Finds contact on a part of the surface: that of the constructor. \param begin  load at the
   /// beginning of the step \param check  called with the contact forces before the step ends
-  void take_part(const SurfacePatch& part, const Load& begin,
-                 std::function<void(std::span<const NodalContactForce>)> check);
+  void take_part(const statics::SurfacePatch& part, const contact::Load& begin,
+                 std::function<void(std::span<const contact::NodalContactForce>)> check);
   /// Interpolates the load between `start` and `end`, from that of the output state to that at
   /// `end`, unless it pulses. A jump of the load between steps of the scene then moves other
   /// objects no faster than this interval allows.
@@ -141,7 +141,7 @@ public:
 
 private:
   struct Way {
-    Load from, to;
+    contact::Load from, to;
     std::vector<double> stood; ///< displacement at `start`
     double start = 0, end = 0;
   };
@@ -151,19 +151,19 @@ private:
   const std::vector<std::uint32_t>& instrument_of_piece_;
   void end_part();
   struct Part {
-    const SurfacePatch* part = nullptr;
-    const Load* begin = nullptr;
-    std::function<void(std::span<const NodalContactForce>)> check;
+    const statics::SurfacePatch* part = nullptr;
+    const contact::Load* begin = nullptr;
+    std::function<void(std::span<const contact::NodalContactForce>)> check;
     std::vector<double> stood; ///< displacement of its clusters
   };
-  Load load_;
+  contact::Load load_;
   std::optional<Part> part_;
-  std::optional<Load> given_;
+  std::optional<contact::Load> given_;
   std::optional<double> given_time_;
   std::optional<Way> way_;
-  std::unique_ptr<StaticContactBody> body_;
-  SolidStatic* strained_ = nullptr;         ///< instead of body_ if the object has a law
-  std::unique_ptr<contact::HeldBody> held_; ///< instead of body_ if the model holds all nodes
+  std::unique_ptr<statics::StaticContactBody> body_;
+  dynamics::SolidStatic* strained_ = nullptr; ///< instead of body_ if the object has a law
+  std::unique_ptr<contact::HeldBody> held_;   ///< instead of body_ if the model holds all nodes
 };
 
 /// An instrument in an island.
@@ -171,20 +171,20 @@ class InstrumentMember final : public contact::IslandMember {
 public:
   /// \param start  its present pose
   InstrumentMember(World& w, std::size_t instrument, const contact::BodySurface& surface,
-                   const Pose& start)
+                   const contact::Pose& start)
       : w_(w), instrument_(instrument), surface_(surface), now_(start) {}
   contact::ContactBody& begin(double from, double to, const Context& context) override;
   void end(std::span<const Force> forces, double h, const Context& context) override;
   /// Sets the pose at the end of the next step, instead of that of the instrument's path.
   /// \param duration  of the step, for a coupling
-  void set_target(const Pose& target, double duration) {
+  void set_target(const contact::Pose& target, double duration) {
     given_ = target;
     duration_ = duration;
   }
   void follow_way() { given_.reset(); }
-  const Pose& pose() const { return now_; }
+  const contact::Pose& pose() const { return now_; }
   /// Pose at the end of the step that has been begun. \pre it is solved
-  Pose end_pose() const {
+  contact::Pose end_pose() const {
     return {target_.place + (instrument().coupled ? body_->displacement() : Vec3{}), target_.turn};
   }
 
@@ -193,9 +193,9 @@ private:
   World& w_;
   std::size_t instrument_;
   const contact::BodySurface& surface_;
-  Pose now_, target_;
+  contact::Pose now_, target_;
   Vec3 hand_; ///< at the end of the step
-  std::optional<Pose> given_;
+  std::optional<contact::Pose> given_;
   double duration_ = 0;
   std::unique_ptr<contact::InstrumentBody> body_;
 };
@@ -209,14 +209,15 @@ struct IslandMembers {
 };
 /// \param start  poses of the instruments, in the order of parts.instruments
 void make_members(World& w, const IslandParts& parts, const IslandCache& island,
-                  std::span<const Pose> start, IslandMembers& members);
+                  std::span<const contact::Pose> start, IslandMembers& members);
 
 /// Largest displacement of an instrument's point in one step, over its radius.
 inline constexpr double instrument_step = 0.5;
 
 /// Interpolates between two loads. Prescribed displacements start at the present ones of their
 /// nodes. \param shape  displacement at the start \param part  0: `from`, 1: `to`
-Load load_between(const Load& from, const Load& to, std::span<const double> shape, double part);
+contact::Load load_between(const contact::Load& from, const contact::Load& to,
+                           std::span<const double> shape, double part);
 /// Displacement of the output state: of all nodes if a displaced node is inside the solid, else of
 /// the surface.
 std::vector<double> stood_shape(World& w, Object& object);
@@ -224,9 +225,11 @@ std::vector<double> stood_shape(World& w, Object& object);
 [[noreturn]] void fail_contact(const World& w, const IslandParts& parts, const Error& error);
 void count_contact(World& w, const contact::StepReport& report);
 /// Bounding box of an instrument between two poses.
-Box3 box_between(const InstrumentShape& shape, const Pose& from, const Pose& to);
+Box3 box_between(const contact::InstrumentShape& shape, const contact::Pose& from,
+                 const contact::Pose& to);
 /// Number of steps between two poses such that each moves by at most instrument_step.
-std::size_t parts_of_way(const InstrumentShape& shape, const Pose& from, const Pose& to);
+std::size_t parts_of_way(const contact::InstrumentShape& shape, const contact::Pose& from,
+                         const contact::Pose& to);
 /// Whether instruments may touch the object. If not, a warning is issued once.
 bool takes_instruments(World& w, Object& object);
 /// Lets a coupled instrument that touches nothing follow its hand.
@@ -234,4 +237,4 @@ void follow_hand(Instrument& i, double duration, double to);
 /// Bounding box of an object's surface in its output state.
 const Box3& shown_box(World& w, std::size_t index);
 
-} // namespace gewebe::simulation
+} // namespace gewebe::scene

@@ -13,7 +13,7 @@
 #include <set>
 #include <utility>
 
-namespace gewebe::simulation {
+namespace gewebe::scene {
 
 namespace {
 
@@ -59,10 +59,10 @@ struct Ways {
   }
   Box3 of_instrument(std::size_t k) const {
     const Instrument& i = w.now.instruments[k];
-    Pose end = i.way.at(to), begin = i.before;
+    contact::Pose end = i.way.at(to), begin = i.before;
     Box3 box = box_between(i.shape, begin, end);
     if (i.coupled) {
-      const Box3 here = PlacedInstrument(i.shape, i.pose(w.now.clock.time)).box();
+      const Box3 here = contact::PlacedInstrument(i.shape, i.pose(w.now.clock.time)).box();
       box.add(here.min);
       box.add(here.max);
     }
@@ -79,14 +79,14 @@ struct Ways {
                        (object.statics.made() || !object.load->empty());
     if (!moves)
       return of_object(index).box;
-    Load load = acting_at(object, to);
-    for (const NodalContactForce& f : shown.contact)
+    contact::Load load = acting_at(object, to);
+    for (const contact::NodalContactForce& f : shown.contact)
       if (!load.displacement.contains(f.node))
         load.force[f.node] += f.force;
     update_solver(w, object, load);
     const std::span<const double> u = static_surface(object);
     Box3 box;
-    for (std::size_t i = 0; i < surface_count(object.model()); ++i)
+    for (std::size_t i = 0; i < model::surface_count(object.model()); ++i)
       box.add(object.model().nodes[i].position + vector_at(u, i));
     return box;
   }
@@ -100,10 +100,10 @@ struct Ways {
       const Extent other = of_object(b);
       const double margin = near_part * std::min(one.box.longest_side(), other.box.longest_side()) +
                             2 * duration() * (one.speed + other.speed) + fall;
-      return near(one.box, other.box, margin);
+      return contact::near(one.box, other.box, margin);
     }
     const double margin = near_part * one.box.longest_side() + 2 * duration() * one.speed + fall;
-    return near(one.box, of_instrument(b - objects), margin);
+    return contact::near(one.box, of_instrument(b - objects), margin);
   }
 };
 
@@ -162,10 +162,10 @@ bool sleeps(const World& w, const IslandParts& island, double to) {
     if (!i.coupled)
       return i.before == i.way.at(to);
     const Instrument::Coupled& c = *i.coupled;
-    const CouplingStep step(c.coupling, c.lag, to - w.now.clock.time);
+    const contact::CouplingStep step(c.coupling, c.lag, to - w.now.clock.time);
     const Vec3 next = i.way.at(to).place - step.lag(c.force);
     return i.before.turn == i.way.at(to).turn &&
-           norm(next - c.place) <= led_to_rest * i.shape.radius;
+           norm(next - c.place) <= contact::led_to_rest * i.shape.radius;
   };
   const auto stays = [&](std::size_t index) {
     const Object& object = w.now.objects[index];
@@ -190,7 +190,7 @@ bool has_come_to_rest(const World& w, const IslandParts& island, double time, do
 void sleep_on(World& w, const IslandParts& island, double duration) {
   for (const auto& body : island.bodies)
     for (const std::size_t part : body->parts)
-      for (NodalContactForce f : w.now.objects[part].touching) {
+      for (contact::NodalContactForce f : w.now.objects[part].touching) {
         f.force *= duration;
         w.now.objects[part].impulses.push_back(f);
       }
@@ -201,7 +201,7 @@ void sleep_on(World& w, const IslandParts& island, double duration) {
 void clear_jumps(World& w, const IslandParts& island, contact::IslandMotion& motion,
                  IslandMembers& members, double h) {
   std::size_t parts = 0;
-  std::vector<Pose> from, to;
+  std::vector<contact::Pose> from, to;
   for (std::size_t n = 0; n < island.instruments.size(); ++n) {
     const Instrument& i = w.now.instruments[island.instruments[n]];
     from.push_back(members.instruments[n].pose());
@@ -218,7 +218,9 @@ void clear_jumps(World& w, const IslandParts& island, contact::IslandMotion& mot
     for (std::size_t n = 0; n < from.size(); ++n)
       if (!w.now.instruments[island.instruments[n]].coupled)
         members.instruments[n].set_target(
-            between(from[n], to[n], static_cast<double>(part) / static_cast<double>(parts)), h);
+            contact::between(from[n], to[n],
+                             static_cast<double>(part) / static_cast<double>(parts)),
+            h);
     motion.advance(members.all, start, start + h, w.context);
   }
   for (BodyMember& body : members.bodies)
@@ -239,10 +241,10 @@ void advance_island(World& w, IslandParts& island, double to) {
   for (const auto& body : island.bodies)
     step = std::min(step, integration_step(w, *body));
   IslandCache& cache = island_of(w, island);
-  std::vector<Pose> stood;
+  std::vector<contact::Pose> stood;
   for (const std::size_t k : island.instruments) {
     const Instrument& i = w.now.instruments[k];
-    stood.push_back(i.coupled ? Pose{i.coupled->place, i.before.turn} : i.before);
+    stood.push_back(i.coupled ? contact::Pose{i.coupled->place, i.before.turn} : i.before);
   }
   IslandMembers members;
   make_members(w, island, cache, stood, members);
@@ -270,7 +272,7 @@ void advance_island(World& w, IslandParts& island, double to) {
   } catch (const contact::NotSolved& error) {
     count_contact(w, cache.motion->take_report());
     fail_contact(w, island, error);
-  } catch (const MotionError& error) {
+  } catch (const dynamics::MotionError& error) {
     for (const auto& body : island.bodies) {
       body->failure = std::current_exception();
       raise(w, *body);
@@ -365,7 +367,7 @@ std::vector<NodePair> advance_once(World& w, double to, const std::set<NodePair>
     return box;
   };
   for (const NodePair& pair : apart)
-    if (gewebe::near(passed(pair.first), passed(pair.second)))
+    if (gewebe::contact::near(passed(pair.first), passed(pair.second)))
       met.push_back(pair);
   return met;
 }
@@ -375,7 +377,7 @@ std::vector<NodePair> advance_once(World& w, double to, const std::set<NodePair>
 void follow_hand(Instrument& i, double duration, double to) {
   Instrument::Coupled& c = *i.coupled;
   const Vec3 hand = i.way.at(to).place;
-  const CouplingStep step(c.coupling, c.lag, duration);
+  const contact::CouplingStep step(c.coupling, c.lag, duration);
   const Vec3 place = hand - step.lag({});
   c.force = {};
   c.lag = hand - place;
@@ -410,7 +412,7 @@ void advance_bodies(World& w, double to) {
   }
   SimulationCounts& counts = w.now.counts;
   for (const auto& body : w.now.bodies) {
-    const SolidStepCounts took = body->moving->take_counts();
+    const dynamics::SolidStepCounts took = body->moving->take_counts();
     add_counts(counts.solids, took);
     if (took.unfinished > 0)
       w.now.news.unfinished.insert(w.now.news.unfinished.end(), body->parts.begin(),
@@ -436,8 +438,9 @@ void end_contact(World& w, double duration) {
   for (Object& object : w.now.objects) {
     if (object.method != Method::ela)
       continue;
-    std::vector<NodalContactForce> means = sums_of(std::exchange(object.impulses, {}));
-    for (NodalContactForce& f : means)
+    std::vector<contact::NodalContactForce> means =
+        contact::sums_of(std::exchange(object.impulses, {}));
+    for (contact::NodalContactForce& f : means)
       f.force = f.force / duration;
     object.shown.valid = object.shown.valid && object.shown.contact == means;
     object.shown.contact = std::move(means);
@@ -494,7 +497,7 @@ void separate(World& w, const SetContact& c) {
   for (const std::size_t index : {c.object, c.other})
     if (const auto& body = w.now.objects[index].body)
       for (const std::size_t part : body->parts) {
-        const std::span<const NodeMotion> all = motion_of(w.now.objects[part]);
+        const std::span<const dynamics::NodeMotion> all = motion_of(w.now.objects[part]);
         motions[part].assign(all.begin(), all.end());
       }
   require_parted_holds(w, c, motions);
@@ -555,4 +558,4 @@ void Rule<SetContact>::log(const World& w, const SetContact& c, ChangeRow& row) 
   row.text = c.separate ? "separate" : "";
 }
 
-} // namespace gewebe::simulation
+} // namespace gewebe::scene

@@ -8,7 +8,7 @@
 #include <utility>
 #include <vector>
 
-namespace gewebe::simulation {
+namespace gewebe::scene {
 
 namespace {
 
@@ -27,9 +27,9 @@ std::span<const double> shape_now(World& w, Object& object) {
 
 /// Instruments that touch the object go from where they stood when it was shown.
 void stand_back(World& w, const Object& object) {
-  for (const NodalContactForce& f : object.shown.contact)
+  for (const contact::NodalContactForce& f : object.shown.contact)
     if (f.instrument < w.now.instruments.size())
-      if (const std::optional<Pose> stood = pose_at(w, 0, f.instrument))
+      if (const std::optional<contact::Pose> stood = pose_at(w, 0, f.instrument))
         w.now.instruments[f.instrument].before = *stood;
 }
 
@@ -43,7 +43,7 @@ void set_going(World& w, std::size_t index, std::span<const double> u) {
     return;
   need_body(w, index);
   Object& object = w.now.objects[index];
-  std::vector<NodeMotion> motion(object.model().nodes.size());
+  std::vector<dynamics::NodeMotion> motion(object.model().nodes.size());
   for (std::size_t i = 0; i < motion.size(); ++i)
     motion[i].displacement = at(u, i);
   object.body->moving->set_motion(motion);
@@ -55,7 +55,7 @@ double stop(World& w, Object& object, std::span<const double> u) {
   double jump = 0;
   if (object.body == nullptr)
     return jump;
-  const std::span<const NodeMotion> motion = object.body->moving->motion();
+  const std::span<const dynamics::NodeMotion> motion = object.body->moving->motion();
   for (std::size_t i = 0; i < motion.size(); ++i)
     jump = std::max(jump, norm((u.empty() ? Vec3{} : at(u, i)) - motion[i].displacement));
   drop_body(w, object.body.get());
@@ -93,4 +93,4 @@ void Rule<SetMethod>::log(const World& w, const SetMethod& c, ChangeRow& row) {
     row.value = jumps.back().size;
 }
 
-} // namespace gewebe::simulation
+} // namespace gewebe::scene

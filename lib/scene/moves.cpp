@@ -14,7 +14,7 @@
 #include <variant>
 #include <vector>
 
-namespace gewebe::simulation {
+namespace gewebe::scene {
 
 void Moves::add(std::span<const std::pair<std::uint32_t, To>> ways, std::size_t nodes) {
   first.assign(nodes + 1, 0);
@@ -29,9 +29,9 @@ void Moves::add(std::span<const std::pair<std::uint32_t, To>> ways, std::size_t 
 }
 
 /// The object that replaces `old`: it has another model, and no data by node.
-Object renumbered(const Object& old, std::shared_ptr<const Model> model) {
-  const auto gravity_of = [](const Load& load) {
-    Load alone;
+Object renumbered(const Object& old, std::shared_ptr<const model::Model> model) {
+  const auto gravity_of = [](const contact::Load& load) {
+    contact::Load alone;
     alone.gravity = load.gravity;
     return alone;
   };
@@ -118,10 +118,10 @@ public:
   }
 
   template <class LoadOf>
-  void follow_load(const Load& from, LoadOf&& load_of) const {
+  void follow_load(const contact::Load& from, LoadOf&& load_of) const {
     for (const auto& [node, force] : from.force)
       for (const Moves::To& to : moves_.of(node)) {
-        Load& load = load_of((*this)(to));
+        contact::Load& load = load_of((*this)(to));
         load.force[to.node] += to.share * force;
         if (const auto p = from.force_period.find(node); p != from.force_period.end())
           load.force_period[to.node] = p->second;
@@ -150,9 +150,9 @@ private:
 
   /// A node among displaced ones is displaced if they go together, one among pressed ones is
   /// pressed.
-  static void join_load(const Load& from, const Moves::Between& b, Load& load) {
+  static void join_load(const contact::Load& from, const Moves::Between& b, contact::Load& load) {
     if (const auto pressures = shared(from.pressure, b)) {
-      NodePressure sum{0, (*pressures)[0].first.period};
+      contact::NodePressure sum{0, (*pressures)[0].first.period};
       bool alike = true;
       for (const auto& [pressure, share] : *pressures) {
         sum.pressure += share * pressure.pressure;
@@ -170,9 +170,9 @@ private:
       const auto ramps = shared(from.ramp, b);
       if (!ramps)
         return;
-      Ramp sum = (*ramps)[0].first;
-      const auto way_of = [](const Ramp& ramp) {
-        return ramp.by ? std::optional<PoseWay>(ramp.by->way) : std::nullopt;
+      contact::Ramp sum = (*ramps)[0].first;
+      const auto way_of = [](const contact::Ramp& ramp) {
+        return ramp.by ? std::optional<contact::PoseWay>(ramp.by->way) : std::nullopt;
       };
       for (const auto& [ramp, share] : *ramps)
         if (ramp.start != sum.start || ramp.end != sum.end || !(way_of(ramp) == way_of(sum)))
@@ -202,30 +202,32 @@ private:
 /// Shape, forces and loads.
 void move_shown(const Object& old, const Moves& moves, std::deque<Object>& pieces) {
   const Pieces piece(moves, pieces);
-  piece.follow_load(*old.load, [](Object& o) -> Load& { return o.load.write(); });
-  piece.follow_load(*old.shown.load, [](Object& o) -> Load& { return o.shown.load.write(); });
-  piece.follow_load(*old.came.load, [](Object& o) -> Load& { return o.came.load.write(); });
+  piece.follow_load(*old.load, [](Object& o) -> contact::Load& { return o.load.write(); });
+  piece.follow_load(*old.shown.load,
+                    [](Object& o) -> contact::Load& { return o.shown.load.write(); });
+  piece.follow_load(*old.came.load,
+                    [](Object& o) -> contact::Load& { return o.came.load.write(); });
   for (const auto& [node, mass] : *old.hung)
     for (const Moves::To& to : moves.of(node))
       if (to.share > 0)
         piece(to).hung.write()[to.node] += to.share * mass;
   piece.follow(old.came.touched, [](Object& o) -> auto& { return o.came.touched; });
   std::map<std::size_t, std::map<std::uint32_t, Vec3>> forces;
-  for (const NodeVector& f : *old.shown.forces)
+  for (const contact::NodeVector& f : *old.shown.forces)
     for (const Moves::To& to : moves.of(f.node))
       forces[to.object][to.node] += to.share * f.value;
   for (const auto& [index, all] : forces)
     for (const auto& [node, value] : all)
       piece({.object = index}).shown.forces.write().push_back({node, value});
-  for (const NodalContactForce& t : old.shown.contact)
+  for (const contact::NodalContactForce& t : old.shown.contact)
     for (const Moves::To& to : moves.of(t.node))
       if (to.main)
         piece(to).shown.contact.push_back({to.node, t.instrument, t.force});
-  for (const NodalContactForce& t : old.impulses)
+  for (const contact::NodalContactForce& t : old.impulses)
     for (const Moves::To& to : moves.of(t.node))
       if (to.main)
         piece(to).impulses.push_back({to.node, t.instrument, t.force});
-  for (const NodalContactForce& t : old.touching)
+  for (const contact::NodalContactForce& t : old.touching)
     for (const Moves::To& to : moves.of(t.node))
       if (to.main)
         piece(to).touching.push_back({to.node, t.instrument, t.force});
@@ -397,10 +399,10 @@ Motions motions_of(const World& w, std::size_t index, const Moves& moves,
                    const std::deque<Object>& pieces, std::span<const Vec3> velocity) {
   const Object& old = w.now.objects[index];
   Motions motions;
-  std::vector<NodeMotion> motion;
+  std::vector<dynamics::NodeMotion> motion;
   if (old.body != nullptr) {
     for (const std::size_t part : old.body->parts) {
-      const std::span<const NodeMotion> all = motion_of(w.now.objects[part]);
+      const std::span<const dynamics::NodeMotion> all = motion_of(w.now.objects[part]);
       (part != index ? motions[part] : motion).assign(all.begin(), all.end());
     }
   } else if (old.method == Method::ffe && moves.objects.size() > 1) {
@@ -409,17 +411,17 @@ Motions motions_of(const World& w, std::size_t index, const Moves& moves,
   }
   if (motion.empty())
     return motions;
-  NodeMotion mean; // of nodes that were gone
-  for (const NodeMotion& m : motion) {
+  dynamics::NodeMotion mean; // of nodes that were gone
+  for (const dynamics::NodeMotion& m : motion) {
     mean.displacement += m.displacement / static_cast<double>(motion.size());
     mean.velocity += m.velocity / static_cast<double>(motion.size());
   }
   for (std::size_t k = old.body != nullptr ? 0 : 1; k < pieces.size(); ++k) {
-    const Model& model = pieces[k].model();
-    std::vector<NodeMotion>& to = motions[moves.objects[k]];
+    const model::Model& model = pieces[k].model();
+    std::vector<dynamics::NodeMotion>& to = motions[moves.objects[k]];
     to.resize(model.nodes.size());
     for (std::size_t i = 0; i < to.size(); ++i)
-      if (model.nodes[i].fixed == fixed_none)
+      if (model.nodes[i].fixed == model::fixed_none)
         to[i] = mean;
   }
   for (const bool main : {true, false}) // copies stand where their node does
@@ -432,14 +434,14 @@ Motions motions_of(const World& w, std::size_t index, const Moves& moves,
     const auto at = motions.find(b.object);
     if (at == motions.end())
       continue;
-    NodeMotion sum;
+    dynamics::NodeMotion sum;
     for (const auto& [node, share] : b.of) {
       sum.displacement += share * motion[node].displacement;
       sum.velocity += share * motion[node].velocity;
     }
     const auto piece = std::ranges::find(moves.objects, b.object) - moves.objects.begin();
     for (int a = 0; a < 3; ++a)
-      if (is_fixed(pieces[static_cast<std::size_t>(piece)].model(), b.node, a))
+      if (contact::is_fixed(pieces[static_cast<std::size_t>(piece)].model(), b.node, a))
         sum.displacement[a] = sum.velocity[a] = 0;
     at->second[b.node] = sum;
   }
@@ -467,7 +469,7 @@ void renew_bodies(World& w, const Motions& motions) {
 void move_all(World& w, std::size_t index, const Moves& moves, std::deque<Object> pieces,
               std::span<const Vec3> velocity) {
   const Object old = w.now.objects[index];
-  ElastostaticCounts& spent = pieces[0].statics.spent;
+  statics::ElastostaticCounts& spent = pieces[0].statics.spent;
   add_counts(spent, old.statics.spent);
   if (old.statics.solver)
     add_counts(spent, old.statics.solver->counts());
@@ -503,4 +505,4 @@ void move_all(World& w, std::size_t index, const Moves& moves, std::deque<Object
   renew_bodies(w, motions);
 }
 
-} // namespace gewebe::simulation
+} // namespace gewebe::scene

@@ -7,7 +7,7 @@
 #include <optional>
 #include <utility>
 
-namespace gewebe::simulation {
+namespace gewebe::scene {
 
 void insert(World& w, Object object) {
   for (const Object& other : w.now.objects)
@@ -18,18 +18,18 @@ void insert(World& w, Object object) {
   w.now.objects.push_back(std::move(object));
 }
 
-std::optional<SolidLaw> law_of(const Object& object) {
-  const std::optional<SolidLaw>& chosen = object.matter->solid.law;
-  return object.matter->known ? gewebe::law_of(object.model(), chosen) : chosen;
+std::optional<integrator::SolidLaw> law_of(const Object& object) {
+  const std::optional<integrator::SolidLaw>& chosen = object.matter->solid.law;
+  return object.matter->known ? gewebe::dynamics::law_of(object.model(), chosen) : chosen;
 }
 
 namespace {
 
 /// Laws of materials are known only when the model is read. \throw Error naming the object
 void require_law_served(const Object& object) {
-  std::optional<SolidLaw> law;
+  std::optional<integrator::SolidLaw> law;
   try {
-    law = gewebe::law_of(object.model(), object.matter->solid.law);
+    law = gewebe::dynamics::law_of(object.model(), object.matter->solid.law);
   } catch (const Error& error) {
     throw ObjectError("object " + object.name() + ": " + error.what());
   }
@@ -43,20 +43,21 @@ void require_law_served(const Object& object) {
 } // namespace
 
 bool relaxes(const Object& object) {
-  return object.method == Method::ffe && object.matter->known && is_viscoelastic(object.model());
+  return object.method == Method::ffe && object.matter->known &&
+         dynamics::is_viscoelastic(object.model());
 }
 
-RestTime rest_time(const World& w, const Object& object, double end) {
+dynamics::RestTime rest_time(const World& w, const Object& object, double end) {
   return {w.now.clock.changed, end, object.load->changes_until() > w.now.clock.shown};
 }
 
 void need_model(Object& object) {
   if (object.matter->known)
     return;
-  object.matter->model = std::make_shared<const Model>(object.matter->source.model());
+  object.matter->model = std::make_shared<const model::Model>(object.matter->source.model());
   require_law_served(object);
   object.shown.displacement.replace().assign(3 * object.model().nodes.size(), 0);
   object.matter->known = true;
 }
 
-} // namespace gewebe::simulation
+} // namespace gewebe::scene

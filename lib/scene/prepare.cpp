@@ -3,7 +3,7 @@
 
 #include "scene/rules_internal.h"
 
-namespace gewebe::simulation {
+namespace gewebe::scene {
 
 void Rule<Prepare>::check(World& w, const Prepare& c) {
   Object& object = w.now.objects.at(c.object);
@@ -31,7 +31,7 @@ void Rule<Prepare>::apply(World& w, const Prepare& c) {
   } else if (object.warp) {
     (void)warped_of(w, object);
   } else {
-    Elastostatic& solver = solver_of(w, object);
+    statics::Elastostatic& solver = solver_of(w, object);
     if (object.stages.options)
       (void)two_step_of(w, object);
     if (c.contact)
@@ -48,4 +48,4 @@ void Rule<Prepare>::log(const World&, const Prepare& c, ChangeRow& row) {
   row.text = c.contact && c.cut ? "contact cut" : c.cut ? "cut" : "contact";
 }
 
-} // namespace gewebe::simulation
+} // namespace gewebe::scene

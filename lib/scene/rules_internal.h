@@ -8,7 +8,7 @@
 #include <cstddef>
 #include <string>
 
-namespace gewebe::simulation {
+namespace gewebe::scene {
 
 /// Defaults for the row of a kind.
 template <class Kind>
@@ -206,4 +206,4 @@ void apply(World& w, const Change& change);
 /// Log row of a change that has just taken effect.
 ChangeRow row_of(const World& w, const Change& change);
 
-} // namespace gewebe::simulation
+} // namespace gewebe::scene

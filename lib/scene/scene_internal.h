@@ -32,7 +32,7 @@
 #include <utility>
 #include <vector>
 
-namespace gewebe::simulation {
+namespace gewebe::scene {
 
 /// Renumbering of an object's nodes by a cut: the new object and number of each node.
 struct Moves {
@@ -72,13 +72,14 @@ struct Told {
 struct Matter {
   std::string name;
   ObjectSource source;
-  SolidChoice solid;                                                    // how a solid moves
-  std::shared_ptr<const Model> model = std::make_shared<const Model>(); // empty until it is read
-  bool known = false;                                                   // `model` has been read
-  double shortest_edge = 0;                                             // mm; 0: not yet known
-  double size = 0;                  // mm, longest side of the box at rest; 0: not yet known
-  std::optional<Box3> box;          // of the surface at rest, see shown_box
-  std::optional<NodeCounts> counts; // of the model, counted when first needed
+  integrator::SolidChoice solid; // how a solid moves
+  std::shared_ptr<const model::Model> model =
+      std::make_shared<const model::Model>(); // empty until it is read
+  bool known = false;                         // `model` has been read
+  double shortest_edge = 0;                   // mm; 0: not yet known
+  double size = 0;                         // mm, longest side of the box at rest; 0: not yet known
+  std::optional<Box3> box;                 // of the surface at rest, see shown_box
+  std::optional<model::NodeCounts> counts; // of the model, counted when first needed
   Told told;
 };
 
@@ -86,24 +87,24 @@ struct ContactReach;
 
 /// Solvers of an elastostatic object, made when needed.
 struct Statics {
-  std::shared_ptr<Elastostatic> solver;
-  std::shared_ptr<TwoStep> two_step;             // over `solver`
-  std::shared_ptr<WarpedStatics> warped;         // in place of both
-  std::shared_ptr<SolidStatic> strained;         // in place of all
-  std::shared_ptr<ContactReach> reach;           // of `solver`, see contact_reach
-  std::shared_ptr<ComplianceSource> prepared;    // of the cut model, by cut_source
-  std::shared_ptr<const CutStiffness> stiffness; // source of `prepared`
-  ElastostaticCounts spent;                      // by solvers that have been dropped
-  int slow = 0;                                  // updates in a row that took too long for the rate
+  std::shared_ptr<statics::Elastostatic> solver;
+  std::shared_ptr<statics::TwoStep> two_step;             // over `solver`
+  std::shared_ptr<statics::WarpedStatics> warped;         // in place of both
+  std::shared_ptr<dynamics::SolidStatic> strained;        // in place of all
+  std::shared_ptr<ContactReach> reach;                    // of `solver`, see contact_reach
+  std::shared_ptr<compliance::ComplianceSource> prepared; // of the cut model, by cut_source
+  std::shared_ptr<const update::CutStiffness> stiffness;  // source of `prepared`
+  statics::ElastostaticCounts spent;                      // by solvers that have been dropped
+  int slow = 0; // updates in a row that took too long for the rate
 
   bool made() const { return solver || warped || strained; }
 
   /// What later results depend on, to the bit.
   struct Past {
-    std::shared_ptr<const Elastostatic::Past> solver{};
-    std::shared_ptr<const TwoStep::Past> two_step{};
-    std::shared_ptr<const WarpedAnswer> warped{};
-    std::shared_ptr<const SolidRest> strained{};
+    std::shared_ptr<const statics::Elastostatic::Past> solver{};
+    std::shared_ptr<const statics::TwoStep::Past> two_step{};
+    std::shared_ptr<const statics::WarpedAnswer> warped{};
+    std::shared_ptr<const dynamics::SolidRest> strained{};
   };
   Past past() const;
   /// \pre these solvers were there at that time
@@ -112,9 +113,9 @@ struct Statics {
 
 /// Body with one integrator: one elastodynamic object, or several that are attached to each other.
 struct Body {
-  std::vector<std::size_t> parts;     // objects
-  std::shared_ptr<const Model> model; // of all parts
-  std::unique_ptr<BodyMotion> moving;
+  std::vector<std::size_t> parts;            // objects
+  std::shared_ptr<const model::Model> model; // of all parts
+  std::unique_ptr<dynamics::BodyMotion> moving;
   double safe = 0; // largest stable step, s
   bool changed = true;
   std::map<std::size_t, Extent> rest_extents{}; // by part, while at rest: see Extents
@@ -135,16 +136,17 @@ struct Body {
 
 /// Settings of the two-step method for an object.
 struct Stages {
-  std::optional<TwoStepOptions> options;
-  std::function<std::shared_ptr<ComplianceSource>()> second; // its second stage
-  std::shared_ptr<const Model> model, first_model; // of the second stage: present, and before cuts
+  std::optional<statics::TwoStepOptions> options;
+  std::function<std::shared_ptr<compliance::ComplianceSource>()> second; // its second stage
+  std::shared_ptr<const model::Model> model,
+      first_model;     // of the second stage: present, and before cuts
   bool warned = false; // a warning of a threshold that was never reached has been issued
 };
 
 /// Displacement before the cut, computed lazily from the model of that time.
 struct DeferredShape {
-  std::shared_ptr<const Model> model;
-  Load load;
+  std::shared_ptr<const model::Model> model;
+  contact::Load load;
   std::vector<std::shared_ptr<const Moves>> moves; // of the cuts since then
 };
 
@@ -153,13 +155,14 @@ struct Shown {
   /// `displacement` is that of all nodes, or of the first ones if a solid's solver has rows for its
   /// surface only. `whole` is that of all nodes, or empty while it is not needed.
   CopyOnWrite<std::vector<double>> displacement{}, whole{};
-  CopyOnWrite<std::vector<NodeVector>> forces{};
-  std::vector<NodalContactForce> contact{}; ///< of an elastodynamic object: means over the step
+  CopyOnWrite<std::vector<contact::NodeVector>> forces{};
+  std::vector<contact::NodalContactForce>
+      contact{};      ///< of an elastodynamic object: means over the step
   bool valid = true;  // forces (of ela also the displacement) belong to the present state
   bool shaped = true; // of ffe: the displacement belongs to the present load
   bool rough = false; // accurate to the tolerance only; the scene itself uses the exact one
   std::shared_ptr<const DeferredShape> deferred{}; // source of the displacement while not `shaped`
-  CopyOnWrite<Load> load{};
+  CopyOnWrite<contact::Load> load{};
   double time = 0;
   bool posed = false;        // the displacement is a shape of ffe
   std::optional<Box3> box{}; // see shown_box; empty until it is needed for this shape
@@ -171,7 +174,7 @@ struct Shown {
 
 /// Previous state of an elastostatic object, one step earlier; see shape_velocity.
 struct CameFrom {
-  CopyOnWrite<Load> load{};
+  CopyOnWrite<contact::Load> load{};
   std::map<std::uint32_t, Vec3> touched{}; // displacements of nodes that instruments touched
   double duration = 0;                     // s from then to now; 0: there is no previous state
   std::vector<Vec3> velocity{};            // of nodes, if a cut left no stiffness to compute it
@@ -195,12 +198,12 @@ struct BladeTrail {
 
 /// Effects of cuts on an object.
 struct CutState {
-  std::shared_ptr<const Model> first{};                  // model before all cuts, of a cut object
+  std::shared_ptr<const model::Model> first{};           // model before all cuts, of a cut object
   CopyOnWrite<std::vector<std::uint32_t>> first_nodes{}; // see ObjectFacts
   CopyOnWrite<std::vector<std::uint32_t>> places{};      // see ObjectFacts
-  Cut scored{};                                          // severed edges that still hang together
+  cutting::Cut scored{};                                 // severed edges that still hang together
   double tear = 0;                                       // largest strain of springs
-  TearLimit limit{};                                     // of a solid
+  cutting::TearLimit limit{};                            // of a solid
   std::vector<BladeTrail> trails{};                      // of blades in a solid
 };
 
@@ -210,24 +213,25 @@ struct Object {
   Statics statics{};
   Method method = Method::ela;
   Integration integration = Integration::semi_implicit; // of a net; automatic: not yet chosen
-  CopyOnWrite<Load> load{};
+  CopyOnWrite<contact::Load> load{};
   CopyOnWrite<std::map<std::uint32_t, double>> hung{}; // g by node, beside the model's masses
   Stages stages;
-  bool warp = false;                          // large rotations
-  bool meets = false;                         // a SetContact names it
-  std::shared_ptr<const WarpedAnswer> warped; // last result, the start of the next iteration
-  std::shared_ptr<const SolidRest> strained;  // the same under large strains
-  std::shared_ptr<Body> body;                 // of an elastodynamic object
-  std::size_t offset = 0;                     // of its nodes in the body
+  bool warp = false;  // large rotations
+  bool meets = false; // a SetContact names it
+  std::shared_ptr<const statics::WarpedAnswer>
+      warped; // last result, the start of the next iteration
+  std::shared_ptr<const dynamics::SolidRest> strained; // the same under large strains
+  std::shared_ptr<Body> body;                          // of an elastodynamic object
+  std::size_t offset = 0;                              // of its nodes in the body
   Shown shown;
   CameFrom came;
   RangeWatch range;
-  std::vector<NodalContactForce> impulses; // of contact in this step so far, 1e-6 N s
-  std::vector<NodalContactForce> touching; // present contact forces
+  std::vector<contact::NodalContactForce> impulses; // of contact in this step so far, 1e-6 N s
+  std::vector<contact::NodalContactForce> touching; // present contact forces
   bool in_motion = false; // of ffe: moving bodies touch it in this step, see islands.cpp
   CutState cut;
 
-  const Model& model() const { return *matter->model; }
+  const model::Model& model() const { return *matter->model; }
   const std::string& name() const { return matter->name; }
 };
 
@@ -253,25 +257,25 @@ struct Instrument {
     Vec3 point; // on the instrument
   };
   std::string name;
-  InstrumentShape shape;
+  contact::InstrumentShape shape;
   bool present = false;
-  PoseWay way;
+  contact::PoseWay way;
   std::vector<Grip> grips;
-  std::vector<Pose> path; // of a blade: its poses in this step
-  Pose before;            // pose at the last advance of elastodynamic objects
-  bool changed = false;   // put or withdrawn since `before`
-  bool stepped = false;   // an island with moving bodies has moved it in this step
+  std::vector<contact::Pose> path; // of a blade: its poses in this step
+  contact::Pose before;            // pose at the last advance of elastodynamic objects
+  bool changed = false;            // put or withdrawn since `before`
+  bool stepped = false;            // an island with moving bodies has moved it in this step
   /// State under a virtual coupling. `way` is then the path of the hand.
   struct Coupled {
-    Coupling coupling;
+    contact::Coupling coupling;
     Vec3 place; // of the instrument
     Vec3 lag;   // from the instrument to the hand
     Vec3 force; // on the instrument
   };
   std::optional<Coupled> coupled;
 
-  Pose pose(double time) const {
-    Pose pose = way.at(time);
+  contact::Pose pose(double time) const {
+    contact::Pose pose = way.at(time);
     if (coupled)
       pose.place = coupled->place;
     return pose;
@@ -302,7 +306,7 @@ struct Scene {
   std::vector<ContactRule> contacts;
   std::vector<Instrument> instruments;
   /// Poses of all instruments at successive moments of this step.
-  std::vector<std::vector<std::optional<Pose>>> poses;
+  std::vector<std::vector<std::optional<contact::Pose>>> poses;
   std::optional<double> jumped{}; // time of the last of `poses`, if an instrument jumped there
   CopyOnWrite<std::multimap<double, Event>> events;
   Vec3 gravity;
@@ -319,4 +323,4 @@ struct Snapshot {
   std::vector<Statics::Past> statics; // by object
 };
 
-} // namespace gewebe::simulation
+} // namespace gewebe::scene

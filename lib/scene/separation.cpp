@@ -20,7 +20,7 @@
 #include <utility>
 #include <vector>
 
-namespace gewebe::simulation {
+namespace gewebe::scene {
 
 namespace {
 
@@ -109,7 +109,7 @@ StandingSurface standing_surface(World& w, std::size_t index, const Motions& mot
   StandingSurface s;
   s.object = index;
   s.model = contact::model_surface(object.model());
-  std::span<const NodeMotion> motion;
+  std::span<const dynamics::NodeMotion> motion;
   if (const auto own = motions.find(index); own != motions.end())
     motion = own->second;
   else if (object.body != nullptr)
@@ -122,7 +122,7 @@ StandingSurface standing_surface(World& w, std::size_t index, const Motions& mot
         (motion.empty() ? vector_at(*object.shown.displacement, node) : motion[node].displacement));
     bool held = still || object.load->displacement.contains(node);
     for (int a = 0; a < 3; ++a)
-      held = held || is_fixed(object.model(), node, a);
+      held = held || contact::is_fixed(object.model(), node, a);
     s.held.push_back(held ? 1 : 0);
   }
   return s;
@@ -174,8 +174,8 @@ std::vector<std::size_t> separate_overlaps(World& w, std::span<const ContactRule
     std::string names;
     for (const std::size_t index : objects)
       names += (names.empty() ? "" : ", ") + w.now.objects[index].name();
-    return Error("surfaces of " + names + " overlap near " + number_text(where->x) + " " +
-                 number_text(where->y) + " " + number_text(where->z) + " and " + why);
+    return Error("surfaces of " + names + " overlap near " + text::number_text(where->x) + " " +
+                 text::number_text(where->y) + " " + text::number_text(where->z) + " and " + why);
   };
   const double most = farthest * motion.island().edge;
   std::vector<std::vector<Vec3>> start;
@@ -189,7 +189,7 @@ std::vector<std::size_t> separate_overlaps(World& w, std::span<const ContactRule
   while (!draw_in()) {
     drawn *= 2;
     if (drawn > most)
-      throw fail("stand in each other by more than " + number_text(2 * most) +
+      throw fail("stand in each other by more than " + text::number_text(2 * most) +
                  " mm, or where they are held, expected surfaces that can be moved apart");
   }
   std::deque<VertexSprings> bodies;
@@ -216,4 +216,4 @@ std::vector<std::size_t> separate_overlaps(World& w, std::span<const ContactRule
   return moved;
 }
 
-} // namespace gewebe::simulation
+} // namespace gewebe::scene

@@ -8,7 +8,7 @@
 #include <cmath>
 #include <utility>
 
-namespace gewebe::simulation {
+namespace gewebe::scene {
 
 namespace {
 
@@ -18,14 +18,14 @@ constexpr double max_sizes = 1e6;         // of an object, that a node may be di
 constexpr int slow_enough = 10;           // updates in a row, the first ones read and factorise
 
 std::string percent(double part) {
-  return number_text(std::round(1000 * part) / 10) + " %";
+  return text::number_text(std::round(1000 * part) / 10) + " %";
 }
 
 /// What is shown of it.
 void require_bounded(Object& object) {
   if (object.shown.shaped)
     require_bounded(object, *object.shown.displacement);
-  for (const NodeVector& f : *object.shown.forces)
+  for (const contact::NodeVector& f : *object.shown.forces)
     for (int a = 0; a < 3; ++a)
       if (!(std::abs(f.value[a]) <= largest_number))
         throw Error("the force at node " + std::to_string(f.node) +
@@ -40,12 +40,12 @@ void show_motion(Object& object) {
   object.shown.shaped = true;
   if (object.body == nullptr)
     return;
-  const std::span<const NodeMotion> motion = motion_of(object);
+  const std::span<const dynamics::NodeMotion> motion = motion_of(object);
   for (std::size_t i = 0; i < motion.size(); ++i)
     for (int a = 0; a < 3; ++a)
       u[3 * i + static_cast<std::size_t>(a)] = motion[i].displacement[a];
-  std::vector<NodeVector>& forces = object.shown.forces.write();
-  for (const NodeVector& f : object.body->moving->contact_forces())
+  std::vector<contact::NodeVector>& forces = object.shown.forces.write();
+  for (const contact::NodeVector& f : object.body->moving->contact_forces())
     if (f.node >= object.offset && f.node - object.offset < object.model().nodes.size())
       forces.push_back({f.node - static_cast<std::uint32_t>(object.offset), f.value});
 }
@@ -63,10 +63,10 @@ void update_in_time(World& w, Object& object) {
   const std::chrono::duration<double> taken = std::chrono::steady_clock::now() - start;
   slow = taken.count() * w.options.rate > 1 ? slow + 1 : 0;
   if (slow == slow_enough)
-    w.options.warn("object " + object.name() + " at " + number_text(w.now.clock.time) + " s: its " +
-                   std::to_string(displaced) + " displaced nodes are too many for " +
-                   number_text(w.options.rate) + " steps a second, the last step took " +
-                   number_text(std::round(1e6 * taken.count()) / 1e3) + " ms for it");
+    w.options.warn("object " + object.name() + " at " + text::number_text(w.now.clock.time) +
+                   " s: its " + std::to_string(displaced) + " displaced nodes are too many for " +
+                   text::number_text(w.options.rate) + " steps a second, the last step took " +
+                   text::number_text(std::round(1e6 * taken.count()) / 1e3) + " ms for it");
 }
 
 } // namespace
@@ -75,7 +75,7 @@ void update_in_time(World& w, Object& object) {
 double displacement_limit(Object& object) {
   if (object.matter->size == 0) {
     Box3 box;
-    for (const Node& node : object.model().nodes)
+    for (const model::Node& node : object.model().nodes)
       box.add(node.position);
     object.matter->size = box.empty() || !(box.longest_side() > 0) ? 1 : box.longest_side();
   }
@@ -89,7 +89,7 @@ void require_bounded(Object& object, std::span<const double> displacement,
   for (std::size_t k = 0; k < displacement.size(); ++k)
     if (!(std::abs(displacement[k]) <= max))
       throw Error("node " + std::to_string(nodes.empty() ? k / 3 : nodes[k / 3]) +
-                  " is displaced by over " + number_text(max) +
+                  " is displaced by over " + text::number_text(max) +
                   " mm, a million times the size of the object, expected a smaller load or "
                   "timestep");
 }
@@ -99,7 +99,7 @@ namespace {
 /// Whether it is worth to look at all edges where the largest displacement is this (mm).
 bool may_leave_range(Object& object, double max) {
   if (object.matter->shortest_edge == 0)
-    object.matter->shortest_edge = shortest_edge(object.model());
+    object.matter->shortest_edge = statics::shortest_edge(object.model());
   // Ends that move less than this against each other can do no harm; beyond, a look at all edges
   // would cost as much as the shape, so not every time.
   return !(2 * std::sqrt(3.0) * max <= strain_limit * object.matter->shortest_edge) &&
@@ -120,7 +120,8 @@ void warn_of_range(World& w, Object& object) {
     return;
   object.range.looked_at = max;
   object.range.not_looked = 0;
-  const LinearRange range = linear_range(object.model(), *object.shown.displacement);
+  const statics::LinearRange range =
+      statics::linear_range(object.model(), *object.shown.displacement);
   const bool strained = !(range.strain <= (object.warp ? warp_strain_limit : strain_limit)),
              rotated = !object.warp && !(range.turn <= turn_limit);
   if (!strained && !rotated)
@@ -130,7 +131,7 @@ void warn_of_range(World& w, Object& object) {
   if (!tell)
     return;
   const auto& edge = strained ? range.strain_edge : range.turn_edge;
-  tell("object " + object.name() + " at " + number_text(w.now.clock.time) +
+  tell("object " + object.name() + " at " + text::number_text(w.now.clock.time) +
        " s: beyond the linear range, the edge " + std::to_string(edge[0]) + "-" +
        std::to_string(edge[1]) +
        (strained ? " is strained by " + percent(range.strain)
@@ -186,9 +187,9 @@ void shape_in_step(World& w, Object& object) {
     warn_of_range(w, object);
 }
 
-Load acting_load(const Shown& shown) {
-  Load load = *shown.load;
-  for (const NodalContactForce& f : shown.contact)
+contact::Load acting_load(const Shown& shown) {
+  contact::Load load = *shown.load;
+  for (const contact::NodalContactForce& f : shown.contact)
     if (!load.displacement.contains(f.node))
       load.force[f.node] += f.force;
   return load;
@@ -236,14 +237,14 @@ void begin_showing(World& w, Object& object) {
   shown.largest = 0;
 }
 
-Load acting_at(const Object& object, double time) {
-  Load given = *object.load;
-  std::map<std::uint32_t, NodePressure> pressures;
+contact::Load acting_at(const Object& object, double time) {
+  contact::Load given = *object.load;
+  std::map<std::uint32_t, contact::NodePressure> pressures;
   if (has_law(object)) // pressures follow the surface
     pressures = std::exchange(given.pressure, {});
-  Load load = load_at(given, object.model(), time);
+  contact::Load load = contact::load_at(given, object.model(), time);
   for (const auto& [node, p] : pressures)
-    load.pressure[node] = {p.pressure * pulse(time, p.period), 0};
+    load.pressure[node] = {p.pressure * contact::pulse(time, p.period), 0};
   if (load.gravity != Vec3{})
     for (const auto& [node, mass] : *object.hung)
       load.force[node] += mass * load.gravity;
@@ -304,13 +305,13 @@ void show(World& w, Object& object) {
 void add_contact_forces(Object& object) {
   if (object.shown.contact.empty())
     return;
-  std::vector<NodeVector>& forces = object.shown.forces.write();
-  for (const NodalContactForce& f : object.shown.contact) {
+  std::vector<contact::NodeVector>& forces = object.shown.forces.write();
+  for (const contact::NodalContactForce& f : object.shown.contact) {
     if (object.method == Method::ffe && object.shown.load->displacement.contains(f.node))
       continue;
-    const auto at =
-        std::lower_bound(forces.begin(), forces.end(), f.node,
-                         [](const NodeVector& v, std::uint32_t node) { return v.node < node; });
+    const auto at = std::lower_bound(
+        forces.begin(), forces.end(), f.node,
+        [](const contact::NodeVector& v, std::uint32_t node) { return v.node < node; });
     if (at != forces.end() && at->node == f.node)
       at->value += f.force;
     else
@@ -318,4 +319,4 @@ void add_contact_forces(Object& object) {
   }
 }
 
-} // namespace gewebe::simulation
+} // namespace gewebe::scene

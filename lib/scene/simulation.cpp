@@ -7,9 +7,7 @@
 #include <cmath>
 #include <utility>
 
-namespace gewebe {
-
-using namespace simulation;
+namespace gewebe::scene {
 
 namespace {
 
@@ -38,8 +36,8 @@ std::size_t number_of(const char* what, const std::string& name, std::size_t cou
 
 void require_not_past(const World& w, double time) {
   if (!(time >= w.now.clock.time))
-    throw Error("the time " + number_text(time) + " s is past, expected " +
-                number_text(w.now.clock.time) + " s or later");
+    throw Error("the time " + text::number_text(time) + " s is past, expected " +
+                text::number_text(w.now.clock.time) + " s or later");
 }
 
 } // namespace
@@ -53,7 +51,7 @@ Simulation::~Simulation() = default;
 // ---- objects
 
 void Simulation::add_object(const std::string& name, ObjectSource source, Method method,
-                            Integration integration, const SolidChoice& solid) {
+                            Integration integration, const integrator::SolidChoice& solid) {
   Object object;
   object.matter->name = name;
   object.matter->source = std::move(source);
@@ -63,9 +61,9 @@ void Simulation::add_object(const std::string& name, ObjectSource source, Method
   insert(*world_, std::move(object));
 }
 
-void Simulation::add_object(const std::string& name, Model model, Method method,
-                            std::shared_ptr<ComplianceSource> source, Integration integration,
-                            const SolidChoice& solid) {
+void Simulation::add_object(const std::string& name, model::Model model, Method method,
+                            std::shared_ptr<compliance::ComplianceSource> source,
+                            Integration integration, const integrator::SolidChoice& solid) {
   World& w = *world_;
   Object object;
   object.matter->name = name;
@@ -94,20 +92,20 @@ std::size_t Simulation::object_count() const noexcept {
   return world_->now.objects.size();
 }
 
-const Model& Simulation::model(std::size_t object) const {
+const model::Model& Simulation::model(std::size_t object) const {
   need_model(world_->now.objects.at(object));
   return world_->now.objects[object].model();
 }
 
-const Model& Simulation::first_model(std::size_t object) const {
-  const Model& now = model(object);
+const model::Model& Simulation::first_model(std::size_t object) const {
+  const model::Model& now = model(object);
   const auto& first = world_->now.objects[object].cut.first;
   return first ? *first : now;
 }
 
-Model Simulation::weighed_model(std::size_t object) const {
+model::Model Simulation::weighed_model(std::size_t object) const {
   need_model(world_->now.objects.at(object));
-  return simulation::weighed_model(world_->now.objects[object]);
+  return scene::weighed_model(world_->now.objects[object]);
 }
 
 ObjectFacts Simulation::object(std::size_t object) const {
@@ -124,7 +122,7 @@ ObjectFacts Simulation::object(std::size_t object) const {
           one.stages.model != nullptr,
           one.warp,
           (one.method == Method::ela || has_law(one)) && one.matter->known && is_solid(one),
-          law_of(one).value_or(SolidLaw::corotational),
+          law_of(one).value_or(integrator::SolidLaw::corotational),
           *one.cut.first_nodes,
           *one.cut.places};
 }
@@ -178,7 +176,7 @@ std::vector<AttachmentReport> Simulation::attachments() const {
 // ---- changes
 
 void Simulation::apply(const Change& change) {
-  simulation::apply(*world_, change);
+  scene::apply(*world_, change);
 }
 
 void Simulation::schedule(double time, const Change& change, std::optional<double> period) {
@@ -221,7 +219,7 @@ void Simulation::step(double dt) {
   // Neumaier's sum: ten steps of 0.1 s end at 1 s.
   const double sum = clock.sum + dt;
   if (!std::isfinite(sum))
-    throw Error("a step of " + number_text(dt) + " s from " + number_text(clock.time) +
+    throw Error("a step of " + text::number_text(dt) + " s from " + text::number_text(clock.time) +
                 " s, expected an end that is finite");
   const double lost =
       clock.lost + (clock.sum >= dt ? (clock.sum - sum) + dt : (dt - sum) + clock.sum);
@@ -262,21 +260,21 @@ std::span<const double> Simulation::known_surface(std::size_t object) const {
 }
 
 std::size_t Simulation::surface_nodes(std::size_t object) const {
-  const Model& now = model(object);
+  const model::Model& now = model(object);
   if (now.tetrahedra.empty())
     return now.nodes.size();
   return node_counts(object).surface;
 }
 
-const NodeCounts& Simulation::node_counts(std::size_t object) const {
-  const Model& now = model(object);
-  std::optional<NodeCounts>& counts = world_->now.objects[object].matter->counts;
+const model::NodeCounts& Simulation::node_counts(std::size_t object) const {
+  const model::Model& now = model(object);
+  std::optional<model::NodeCounts>& counts = world_->now.objects[object].matter->counts;
   if (!counts)
-    counts = gewebe::node_counts(now);
+    counts = gewebe::model::node_counts(now);
   return *counts;
 }
 
-const std::vector<NodeVector>& Simulation::contact_forces(std::size_t object) const {
+const std::vector<contact::NodeVector>& Simulation::contact_forces(std::size_t object) const {
   return *world_->now.objects.at(object).shown.forces;
 }
 
@@ -305,8 +303,8 @@ void Simulation::warn_of_thresholds() {
     stages.warned = true;
     if (w.options.warn)
       w.options.warn("object " + object.name() + ": its load never exceeded the threshold " +
-                     number_text(stages.options->threshold) + " of two-step (" +
-                     number_text(largest) + " at most), so the second stage had no effect");
+                     text::number_text(stages.options->threshold) + " of two-step (" +
+                     text::number_text(largest) + " at most), so the second stage had no effect");
   }
 }
 
@@ -317,7 +315,7 @@ SimulationCounts Simulation::counts() const {
     add_counts(all.elastostatic, static_counts(object));
     if (!statics.two_step)
       continue;
-    const ElastostaticCounts second = statics.two_step->second_counts();
+    const statics::ElastostaticCounts second = statics.two_step->second_counts();
     all.elastostatic.solves += second.solves;
     all.elastostatic.columns_read += second.columns_read;
     all.elastostatic.factors += second.factors;
@@ -331,7 +329,8 @@ SimulationState Simulation::state() const {
     if (!object(i).known)
       continue;
     if (!model(i).springs.empty() && this->object(i).shaped)
-      state.strain = std::max(state.strain, linear_range(model(i), displacement(i)).strain);
+      state.strain =
+          std::max(state.strain, statics::linear_range(model(i), displacement(i)).strain);
     const Object& object = world_->now.objects[i];
     if (object.body == nullptr)
       continue;
@@ -341,14 +340,14 @@ SimulationState Simulation::state() const {
       state.elastic_energy += first ? energies->elastic : 0;
       continue;
     }
-    const std::span<const NodeMotion> motion = motion_of(object);
-    state.kinetic_energy += kinetic_energy(object.model(), motion);
+    const std::span<const dynamics::NodeMotion> motion = motion_of(object);
+    state.kinetic_energy += dynamics::kinetic_energy(object.model(), motion);
     for (const auto& [node, mass] : *object.hung)
       state.kinetic_energy += mass * dot(motion[node].velocity, motion[node].velocity) / 2;
-    state.elastic_energy += elastic_energy(object.model(), motion);
+    state.elastic_energy += dynamics::elastic_energy(object.model(), motion);
     state.safe_step = std::min(state.safe_step, object.body->safe);
   }
   return state;
 }
 
-} // namespace gewebe
+} // namespace gewebe::scene

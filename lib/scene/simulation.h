@@ -28,14 +28,14 @@
 #include <variant>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::scene {
 
 /// Functions that load an object's model and stiffness. Each is called when its result is first
 /// needed, `stiffness` again where a rollback has dropped a solver. An exception that they throw
 /// leaves the call that needed the result.
 struct ObjectSource {
-  std::function<Model()> model;
-  std::function<std::shared_ptr<ComplianceSource>(const Model&)>
+  std::function<model::Model()> model;
+  std::function<std::shared_ptr<compliance::ComplianceSource>(const model::Model&)>
       stiffness{}; ///< empty: K is factorised
 };
 
@@ -81,15 +81,15 @@ struct Cutting {
 
 /// Work done so far.
 struct SimulationCounts {
-  std::uint64_t steps = 0;         ///< of the scene
-  std::uint64_t integration = 0;   ///< integration steps of elastodynamic objects
-  std::uint64_t resting = 0;       ///< advances skipped because the object was at rest
-  std::uint64_t moving = 0;        ///< advances that moved an object
-  ElastostaticCounts elastostatic; ///< of all objects: sums, largest errors
-  SolidStepCounts solids;          ///< of all elastodynamic solids
-  contact::StepReport contact;     ///< of all steps with contact
-  double largest_jump = 0;         ///< mm, see MethodJump
-  std::uint64_t cuts = 0;          ///< cuts that changed a model
+  std::uint64_t steps = 0;                  ///< of the scene
+  std::uint64_t integration = 0;            ///< integration steps of elastodynamic objects
+  std::uint64_t resting = 0;                ///< advances skipped because the object was at rest
+  std::uint64_t moving = 0;                 ///< advances that moved an object
+  statics::ElastostaticCounts elastostatic; ///< of all objects: sums, largest errors
+  dynamics::SolidStepCounts solids;         ///< of all elastodynamic solids
+  contact::StepReport contact;              ///< of all steps with contact
+  double largest_jump = 0;                  ///< mm, see MethodJump
+  std::uint64_t cuts = 0;                   ///< cuts that changed a model
   /// How the stiffness of elastostatic objects was updated after cuts, see CutWay.
   std::uint64_t cut_woodbury = 0, cut_refactors = 0, cut_factors = 0;
   std::uint64_t cut_unprepared = 0; ///< of these, updates that first had to factorise
@@ -107,7 +107,7 @@ struct ObjectFacts {
   /// With tetrahedra, and elastodynamic or with large strains: strains are those in the frames of
   /// its elements.
   bool element_frames = false;
-  SolidLaw law = SolidLaw::corotational; ///< of such a solid
+  integrator::SolidLaw law = integrator::SolidLaw::corotational; ///< of such a solid
   /// By node: its node in the first model, or the node that it is a copy of. Empty: unchanged.
   std::span<const std::uint32_t> first_nodes;
   /// By node of the first model: its present number, or CutModel::gone. Empty: unchanged.
@@ -125,10 +125,10 @@ struct News {
 struct InstrumentReport {
   std::string name{};
   bool present = false;
-  InstrumentShape shape;
-  Pose pose;
+  contact::InstrumentShape shape;
+  contact::Pose pose;
   std::optional<Vec3> hand{}; ///< position of the hand, if a virtual coupling moves the instrument
-  Coupling coupling{};
+  contact::Coupling coupling{};
   Vec3 force, torque;    ///< from all objects: 1e-6 N, and 1e-9 N m about its position
   std::size_t nodes = 0; ///< number of nodes that it touches or grasps
 };
@@ -160,9 +160,7 @@ struct SimulationState {
   double safe_step = HUGE_VAL; ///< s, smallest stable step of an elastodynamic object
 };
 
-namespace simulation {
 struct World;
-}
 
 /// A simulated scene. The caller owns it; objects live as long as it does.
 class Simulation {
@@ -178,25 +176,25 @@ public:
   /// \param solid  how a solid moves
   /// \pre check_model(model) passes
   /// \throw Error if the name is taken, or the method can't simulate the model; Cancelled
-  void add_object(const std::string& name, Model model, Method method,
-                  std::shared_ptr<ComplianceSource> source = {},
+  void add_object(const std::string& name, model::Model model, Method method,
+                  std::shared_ptr<compliance::ComplianceSource> source = {},
                   Integration integration = Integration::semi_implicit,
-                  const SolidChoice& solid = {});
+                  const integrator::SolidChoice& solid = {});
   /// Adds an object that is read when it is first needed, at the latest when something acts on it.
   /// Until then it rests. \throw Error if the name is taken
   void add_object(const std::string& name, ObjectSource source, Method method,
                   Integration integration = Integration::semi_implicit,
-                  const SolidChoice& solid = {});
+                  const integrator::SolidChoice& solid = {});
 
   std::size_t object_count() const noexcept;
   /// Present model of an object; reads it if it was not needed before. The reference to a first
   /// model is valid as long as the Simulation, that to a cut model until the next cut.
   /// \throw as its source
-  const Model& model(std::size_t object) const;
+  const model::Model& model(std::size_t object) const;
   /// Model before all cuts. \throw as its source
-  const Model& first_model(std::size_t object) const;
+  const model::Model& first_model(std::size_t object) const;
   /// Present model, with the masses that SetMass has added. \throw as its source
-  Model weighed_model(std::size_t object) const;
+  model::Model weighed_model(std::size_t object) const;
   /// Facts about an object. Valid until the next cut.
   ObjectFacts object(std::size_t object) const;
 
@@ -247,10 +245,10 @@ public:
   /// surface_count of its model if that has tetrahedra, else the number of all nodes.
   std::size_t surface_nodes(std::size_t object) const;
   /// Node counts of its model. They are counted once.
-  const NodeCounts& node_counts(std::size_t object) const;
+  const model::NodeCounts& node_counts(std::size_t object) const;
   /// Reactions of the displaced nodes and forces of instruments on nodes, by ascending node. Forces
   /// of instruments on an elastodynamic object are means over the last step. \throw Error as step
-  const std::vector<NodeVector>& contact_forces(std::size_t object) const;
+  const std::vector<contact::NodeVector>& contact_forces(std::size_t object) const;
 
   /// Sets SimulationOptions::shapes: from now on each step computes the shapes, so that a step
   /// fails if a shape can't be computed.
@@ -267,7 +265,7 @@ public:
   SimulationState state() const;
 
 private:
-  std::unique_ptr<simulation::World> world_;
+  std::unique_ptr<World> world_;
 };
 
 /// Number of the object of that name. \throw Error that lists the existing names
@@ -277,4 +275,4 @@ std::size_t find_instrument(const Simulation& simulation, const std::string& nam
 /// As find_instrument, but instrument_count() if no instrument has that name.
 std::size_t instrument_place(const Simulation& simulation, const std::string& name);
 
-} // namespace gewebe
+} // namespace gewebe::scene

@@ -18,7 +18,7 @@
 #include <utility>
 #include <vector>
 
-namespace gewebe::simulation {
+namespace gewebe::scene {
 
 namespace {
 
@@ -48,7 +48,7 @@ class Carried {
 public:
   Carried(World& w, Object& object) : model_(object.model()) {
     if (object.body != nullptr) {
-      for (const NodeMotion& m : motion_of(object))
+      for (const dynamics::NodeMotion& m : motion_of(object))
         u_.insert(u_.end(), {m.displacement.x, m.displacement.y, m.displacement.z});
     } else if (object.method == Method::ffe) {
       const std::span<const double> shape = whole_shape_in_step(w, object);
@@ -74,10 +74,10 @@ public:
     if (at_rest())
       return place;
     if (!deformed_) {
-      deformed_ = element_mesh(model_);
+      deformed_ = fem::element_mesh(model_);
       deformed_->points = places_;
     }
-    const SolidPlace found = find_place(*deformed_, place);
+    const embedding::SolidPlace found = embedding::find_place(*deformed_, place);
     Vec3 rest;
     for (std::size_t k = 0; k < found.count; ++k)
       rest += found.weight[k] * model_.nodes[found.node[k]].position;
@@ -87,22 +87,22 @@ public:
     if (at_rest())
       return rest;
     if (!rest_)
-      rest_ = element_mesh(model_);
-    return rest + displacement_at(find_place(*rest_, rest), u_);
+      rest_ = fem::element_mesh(model_);
+    return rest + embedding::displacement_at(embedding::find_place(*rest_, rest), u_);
   }
 
 private:
-  const Model& model_;
+  const model::Model& model_;
   std::vector<double> u_; // 3 n, or none at rest
   std::vector<Vec3> places_;
   Box3 box_;
-  std::optional<TetMesh> rest_, deformed_;
+  std::optional<tetrahedra::TetMesh> rest_, deformed_;
 };
 
-double longest_edge(const Model& model) {
+double longest_edge(const model::Model& model) {
   double longest = 0;
   for (const Tetrahedron& t : model.tetrahedra)
-    for (const auto& [a, b] : tetrahedron_edges) {
+    for (const auto& [a, b] : tetrahedra::tetrahedron_edges) {
       const Vec3 d = model.nodes[t[b]].position - model.nodes[t[a]].position;
       longest = std::max(longest, dot(d, d));
     }
@@ -138,28 +138,29 @@ TriangleMesh strip_of(const std::vector<Edge>& edges) {
 }
 
 struct CutByBlade {
-  CutModel cut;
+  cutting::CutModel cut;
   std::vector<Vec3> skin_end; ///< SkinCut::end
 };
 
 /// Nothing where it comes nowhere apart.
 std::optional<CutByBlade> cut_by(const World& w, std::size_t index, const TriangleMesh& blade,
-                                 BladeCutOptions options, const SkinSheet& sheet) {
-  const Model& model = w.now.objects[index].model();
+                                 incision::BladeCutOptions options,
+                                 const cutting::SkinSheet& sheet) {
+  const model::Model& model = w.now.objects[index].model();
   const std::vector<std::uint32_t> held = held_nodes(w, index);
   options.held = held;
-  SolidCut cut = cut_solid(model, blade, options, &sheet);
+  cutting::SolidCut cut = cutting::cut_solid(model, blade, options, &sheet);
   if (cut.report.doubled == 0)
     return std::nullopt;
   std::vector<Vec3> end = std::move(cut.skin_end);
-  return CutByBlade{as_cut_model(model, std::move(cut)), std::move(end)};
+  return CutByBlade{cutting::as_cut_model(model, std::move(cut)), std::move(end)};
 }
 
 // ---- Where blades pass a skin: rows of points at rest
 
 using Row = std::vector<Vec3>;
 
-Row row_of(const Model& model, const Edge& edge, double cell, Carried& carried) {
+Row row_of(const model::Model& model, const Edge& edge, double cell, Carried& carried) {
   if (model.skin.points.empty())
     return {};
   const double length = norm(edge[1] - edge[0]);
@@ -243,10 +244,10 @@ Box3 wider(const Box3& box) {
 
 } // namespace
 
-std::optional<CutModel> cut_by_plane(const World& w, std::size_t index, const PlaneToCut& plane,
-                                     bool skin_too) {
-  const Model& model = w.now.objects[index].model();
-  BladeCutOptions options;
+std::optional<cutting::CutModel> cut_by_plane(const World& w, std::size_t index,
+                                              const PlaneToCut& plane, bool skin_too) {
+  const model::Model& model = w.now.objects[index].model();
+  incision::BladeCutOptions options;
   options.along_faces = plane.along_faces;
   std::vector<std::uint8_t> among;
   if (plane.nodes) {
@@ -255,41 +256,43 @@ std::optional<CutModel> cut_by_plane(const World& w, std::size_t index, const Pl
       among[node] = 1;
     options.among = among;
   }
-  const TriangleMesh blade = plane_blade(model, plane.plane);
-  const auto cut_with = [&](const SkinSheet& sheet) -> std::optional<CutModel> {
+  const TriangleMesh blade = cutting::plane_blade(model, plane.plane);
+  const auto cut_with = [&](const cutting::SkinSheet& sheet) -> std::optional<cutting::CutModel> {
     std::optional<CutByBlade> cut = cut_by(w, index, blade, options, sheet);
     return cut ? std::optional(std::move(cut->cut)) : std::nullopt;
   };
   if (!skin_too || model.skin.points.empty())
     return cut_with({});
   const auto cut_shifted = [&](double shift) {
-    return cut_with(plane_sheet(model.skin, plane.plane, sheet_cell(model), shift));
+    return cut_with(
+        cutting::plane_sheet(model.skin, plane.plane, cutting::sheet_cell(model), shift));
   };
   for (const double shift : std::span(sheet_shifts).first(sheet_shifts.size() - 1))
     try {
       return cut_shifted(shift);
-    } catch (const MeetingOfNoSheets&) { // its lines meet the embedded surface's edges up to
-      continue;                          // rounding; the next shift may avoid them
+    } catch (const mesh::MeetingOfNoSheets&) { // its lines meet the embedded surface's edges up to
+      continue;                                // rounding; the next shift may avoid them
     }
   return cut_shifted(sheet_shifts.back());
 }
 
 /// \throw Error where it parts nothing
-CutModel plane_through(const World& w, std::size_t index, const PlaneToCut& plane) {
-  std::optional<CutModel> cut;
+cutting::CutModel plane_through(const World& w, std::size_t index, const PlaneToCut& plane) {
+  std::optional<cutting::CutModel> cut;
   try {
     cut = cut_by_plane(w, index, plane);
-  } catch (const MeetingOfNoSheets& error) {
+  } catch (const mesh::MeetingOfNoSheets& error) {
     throw Error("the skin can't be cut there: " + std::string(error.what()) +
                 ": another plane, or a model without its skin (exp2ela --no-skin)");
   }
   if (!cut)
-    throw Error("the plane through " + number_text(plane.plane.point.x) + " " +
-                number_text(plane.plane.point.y) + " " + number_text(plane.plane.point.z) +
-                " across " + number_text(plane.plane.normal.x) + " " +
-                number_text(plane.plane.normal.y) + " " + number_text(plane.plane.normal.z) +
-                " parts no tetrahedra" + (plane.nodes ? " of these nodes" : "") +
-                ", expected one that is not cut yet");
+    throw Error("the plane through " + text::number_text(plane.plane.point.x) + " " +
+                text::number_text(plane.plane.point.y) + " " +
+                text::number_text(plane.plane.point.z) + " across " +
+                text::number_text(plane.plane.normal.x) + " " +
+                text::number_text(plane.plane.normal.y) + " " +
+                text::number_text(plane.plane.normal.z) + " parts no tetrahedra" +
+                (plane.nodes ? " of these nodes" : "") + ", expected one that is not cut yet");
   return std::move(*cut);
 }
 
@@ -306,8 +309,8 @@ void sweep_solid(World& w, std::size_t index, std::span<const BladeArea> areas) 
     if (!carried)
       carried.emplace(w, w.now.objects[index]);
     const std::size_t instrument = areas[n].instrument;
-    const Model& model = w.now.objects[index].model();
-    const double cell = model.skin.points.empty() ? 0 : sheet_cell(model);
+    const model::Model& model = w.now.objects[index].model();
+    const double cell = model.skin.points.empty() ? 0 : cutting::sheet_cell(model);
     std::vector<Edge> edges = trail_before(w.now.objects[index], areas[n], *carried);
     std::vector<Row> rows = rows_before(w.now.objects[index], areas[n]);
     if (rows.empty())
@@ -345,17 +348,17 @@ void sweep_solid(World& w, std::size_t index, std::span<const BladeArea> areas) 
     if (!meets)
       continue;
     at_object(w, object, [&] {
-      BladeCutOptions options;
+      incision::BladeCutOptions options;
       options.places = carried->places();
       std::optional<CutByBlade> cut;
       bool skin_too = !rows.empty();
       try {
-        cut = cut_by(w, index, strip_of(edges), options, strip_sheet(rows));
-      } catch (const MeetingOfNoSheets& error) { // it may be with the rows to come
+        cut = cut_by(w, index, strip_of(edges), options, cutting::strip_sheet(rows));
+      } catch (const mesh::MeetingOfNoSheets& error) { // it may be with the rows to come
         skin_too = false;
         cut = cut_by(w, index, strip_of(edges), options, {});
         if (w.options.warn)
-          w.options.warn("object " + object.name() + " at " + number_text(w.now.clock.time) +
+          w.options.warn("object " + object.name() + " at " + text::number_text(w.now.clock.time) +
                          " s: its skin is not cut by this step: " + error.what());
       }
       if (cut) {
@@ -369,4 +372,4 @@ void sweep_solid(World& w, std::size_t index, std::span<const BladeArea> areas) 
   }
 }
 
-} // namespace gewebe::simulation
+} // namespace gewebe::scene

@@ -18,7 +18,7 @@
 #include <set>
 #include <utility>
 
-namespace gewebe::simulation {
+namespace gewebe::scene {
 
 namespace {
 
@@ -31,21 +31,21 @@ bool is_static(const Object& object) {
 
 /// Whether an object in this box has something to do with an instrument.
 bool near_instrument(const World& w, const Box3& box, std::size_t k) {
-  const InstrumentShape& shape = w.now.instruments[k].shape;
+  const contact::InstrumentShape& shape = w.now.instruments[k].shape;
   const double margin = near_part * box.longest_side();
   for (std::size_t p = 0; p < w.now.poses.size(); ++p) {
-    const std::optional<Pose> now = pose_at(w, p, k);
+    const std::optional<contact::Pose> now = pose_at(w, p, k);
     if (!now)
       continue;
-    const Pose before = p > 0 ? pose_at(w, p - 1, k).value_or(*now) : *now;
-    if (near(box_between(shape, before, *now), box, margin))
+    const contact::Pose before = p > 0 ? pose_at(w, p - 1, k).value_or(*now) : *now;
+    if (contact::near(box_between(shape, before, *now), box, margin))
       return true;
   }
   const Instrument& i = w.now.instruments[k];
   return i.present && !i.shape.blade && i.coupled &&
-         near(box_between(shape, {i.coupled->place, i.way.at(w.now.clock.time).turn},
-                          i.way.at(w.now.clock.time)),
-              box, margin);
+         contact::near(box_between(shape, {i.coupled->place, i.way.at(w.now.clock.time).turn},
+                                   i.way.at(w.now.clock.time)),
+                       box, margin);
 }
 
 /// Objects whose shapes are found together.
@@ -62,14 +62,15 @@ bool instrument_moves(const World& w, std::size_t k) {
   if (!i.coupled || !i.present)
     return false;
   const Instrument::Coupled& c = *i.coupled;
-  const CouplingStep step(c.coupling, c.lag, w.now.clock.time - w.now.clock.shown);
+  const contact::CouplingStep step(c.coupling, c.lag, w.now.clock.time - w.now.clock.shown);
   return !(norm(i.way.at(w.now.clock.time).place - step.lag(c.force) - c.place) <=
-           led_to_rest * i.shape.radius);
+           contact::led_to_rest * i.shape.radius);
 }
 
 bool touched_by(const Object& object, std::size_t instrument) {
-  return std::ranges::any_of(
-      object.touching, [&](const NodalContactForce& f) { return f.instrument == instrument; });
+  return std::ranges::any_of(object.touching, [&](const contact::NodalContactForce& f) {
+    return f.instrument == instrument;
+  });
 }
 
 using ObjectPair = std::pair<std::size_t, std::size_t>;
@@ -89,7 +90,7 @@ bool are_near(World& w, const ObjectPair& pair) {
   if (pair.first == pair.second)
     return true;
   const Box3 &one = shown_box(w, pair.first), &other = shown_box(w, pair.second);
-  return near(one, other, near_part * std::min(one.longest_side(), other.longest_side()));
+  return contact::near(one, other, near_part * std::min(one.longest_side(), other.longest_side()));
 }
 
 /// \param late  pairs that count as near \param apart  becomes those that are not near
@@ -205,7 +206,7 @@ public:
 private:
   /// One instrument on the way between two moments.
   struct Leg {
-    Pose from, to;
+    contact::Pose from, to;
     double duration = 0; ///< of a coupled one
   };
   /// Instruments reach more of the surface than was looked at.
@@ -226,7 +227,7 @@ private:
                i.way.at(t0 + end * (w_.now.clock.time - t0)), duration};
       } else {
         const std::size_t last = std::min(moment, w_.now.poses.size() - 1);
-        const std::optional<Pose> now = pose_at(w_, last, k);
+        const std::optional<contact::Pose> now = pose_at(w_, last, k);
         if (!now)
           continue;
         leg = {pose_at(w_, last > 0 ? last - 1 : 0, k).value_or(*now), *now, 0};
@@ -247,17 +248,17 @@ private:
   }
 
   /// Where instruments are in a part of that way that ends at `to`.
-  std::vector<Box3> boxes_of(const IslandParts& parts, std::span<const Pose> start, double to,
-                             double room) const {
+  std::vector<Box3> boxes_of(const IslandParts& parts, std::span<const contact::Pose> start,
+                             double to, double room) const {
     std::vector<Box3> boxes;
     for (std::size_t n = 0; n < legs_.size(); ++n)
       boxes.push_back(box_with_room(w_.now.instruments[parts.instruments[n]].shape, start[n],
-                                    between(legs_[n].from, legs_[n].to, to), room));
+                                    contact::between(legs_[n].from, legs_[n].to, to), room));
     return boxes;
   }
 
-  static Box3 box_with_room(const InstrumentShape& shape, const Pose& from, const Pose& to,
-                            double room) {
+  static Box3 box_with_room(const contact::InstrumentShape& shape, const contact::Pose& from,
+                            const contact::Pose& to, double room) {
     Box3 box = box_between(shape, from, to);
     box.min -= Vec3{room, room, room};
     box.max += Vec3{room, room, room};
@@ -266,10 +267,10 @@ private:
 
   /// Tiles of the object that instruments may reach, and those that are in contact.
   std::vector<std::uint32_t> reached(std::span<const Box3> boxes,
-                                     std::span<const NodalContactForce> contact) {
+                                     std::span<const contact::NodalContactForce> contact) {
     const std::vector<double>& bounds = bounds_under(w_, group_.parts.statics[0], *reach_, contact);
     std::vector<std::uint32_t> nodes;
-    for (const NodalContactForce& f : contact)
+    for (const contact::NodalContactForce& f : contact)
       nodes.push_back(f.node);
     const std::vector<std::uint32_t> near = reach_->tiles.near(boxes, bounds),
                                      with = reach_->tiles.with(nodes);
@@ -280,8 +281,8 @@ private:
 
   /// As go(), with the part of the object's surface that instruments reach: more of it where they
   /// turn out to reach more.
-  void go_on_part(const IslandParts& parts, IslandCache& cache, std::span<const Pose> start,
-                  double from, double to) {
+  void go_on_part(const IslandParts& parts, IslandCache& cache,
+                  std::span<const contact::Pose> start, double from, double to) {
     const contact::Parameters parameters;
     const double edge = cache.motion->island().edge, nearest = cache.motion->activation_distance();
     std::vector<std::uint32_t> tiles =
@@ -299,12 +300,13 @@ private:
         InstrumentMember& tool =
             members.instruments.emplace_back(w_, parts.instruments[n], cache.surfaces[n], start[n]);
         members.all.push_back(&tool);
-        tool.set_target(between(legs_[n].from, legs_[n].to, to), legs_[n].duration * (to - from));
+        tool.set_target(contact::between(legs_[n].from, legs_[n].to, to),
+                        legs_[n].duration * (to - from));
       }
-      const Load& load = before_[0]; // it does not change
+      const contact::Load& load = before_[0]; // it does not change
       object.set_load(load);
       std::vector<std::uint32_t> more;
-      object.take_part(island.part, load, [&](std::span<const NodalContactForce> contact) {
+      object.take_part(island.part, load, [&](std::span<const contact::NodalContactForce> contact) {
         std::vector<Box3> boxes;
         for (std::size_t n = 0; n < legs_.size(); ++n)
           boxes.push_back(box_with_room(w_.now.instruments[parts.instruments[n]].shape, start[n],
@@ -325,12 +327,12 @@ private:
   }
 
   /// \param share  of the load's way, at the end
-  void go_on_whole(const IslandParts& parts, IslandCache& cache, std::span<const Pose> start,
-                   double from, double to, double share) {
+  void go_on_whole(const IslandParts& parts, IslandCache& cache,
+                   std::span<const contact::Pose> start, double from, double to, double share) {
     IslandMembers members;
     make_members(w_, parts, cache, start, members);
     for (std::size_t n = 0; n < legs_.size(); ++n)
-      members.instruments[n].set_target(between(legs_[n].from, legs_[n].to, to),
+      members.instruments[n].set_target(contact::between(legs_[n].from, legs_[n].to, to),
                                         legs_[n].duration * (to - from));
     for (std::size_t k = 0; k < parts.statics.size(); ++k) {
       members.statics[k].set_time(w_.now.clock.shown +
@@ -355,11 +357,11 @@ private:
   /// A part of that way, in halves where contact is not solved.
   void go(const IslandParts& parts, IslandCache& cache, double from, double to, double begin,
           double end, int halvings) {
-    std::vector<Pose> start;
+    std::vector<contact::Pose> start;
     for (std::size_t n = 0; n < legs_.size(); ++n) {
       const Instrument& i = w_.now.instruments[parts.instruments[n]];
-      const Pose pose = between(legs_[n].from, legs_[n].to, from);
-      start.push_back(i.coupled && !i.stepped ? Pose{i.coupled->place, pose.turn} : pose);
+      const contact::Pose pose = contact::between(legs_[n].from, legs_[n].to, from);
+      start.push_back(i.coupled && !i.stepped ? contact::Pose{i.coupled->place, pose.turn} : pose);
     }
     try {
       if (reach_)
@@ -380,7 +382,7 @@ private:
   World& w_;
   const Group& group_;
   std::shared_ptr<ContactReach> reach_; ///< of the only object, if contact is found on a part of it
-  std::vector<Load> before_;
+  std::vector<contact::Load> before_;
   std::vector<std::vector<double>> shape_;
   std::vector<Leg> legs_;
 };
@@ -394,7 +396,7 @@ const Box3& shown_box(World& w, std::size_t index) {
   if (object.shown.box)
     return *object.shown.box;
   Box3& box = object.shown.box.emplace();
-  const std::size_t count = surface_count(object.model());
+  const std::size_t count = model::surface_count(object.model());
   const std::span<const double> u = *object.shown.displacement;
   for (std::size_t i = 0; i < count; ++i)
     box.add(object.model().nodes[i].position + vector_at(u, i));
@@ -414,7 +416,7 @@ Pairs met_unseen(World& w, const Pairs& apart, const std::map<std::size_t, Box3>
   }
   Pairs met;
   for (const ObjectPair& pair : apart.objects)
-    if (near(swept.at(pair.first), swept.at(pair.second)))
+    if (contact::near(swept.at(pair.first), swept.at(pair.second)))
       met.objects.insert(pair);
   for (const ToolPair& pair : apart.tools)
     if (near_instrument(w, swept.at(pair.first), pair.second))
@@ -500,7 +502,7 @@ std::vector<Vec3> shown_positions(World& w, std::size_t index, const contact::Mo
   std::vector<Vec3> x;
   x.reserve(of.node.size());
   if (object.body != nullptr) {
-    const std::span<const NodeMotion> motion = motion_of(object);
+    const std::span<const dynamics::NodeMotion> motion = motion_of(object);
     for (const std::uint32_t node : of.node)
       x.push_back(object.model().nodes[node].position + motion[node].displacement);
     return x;
@@ -526,8 +528,8 @@ double winding(const contact::ModelSurface& surface, std::span<const Vec3> x, co
 }
 
 /// Whether an instrument is inside of a surface or passes it.
-bool is_inside(const InstrumentShape& shape, const Pose& pose, const contact::ModelSurface& surface,
-               std::span<const Vec3> x) {
+bool is_inside(const contact::InstrumentShape& shape, const contact::Pose& pose,
+               const contact::ModelSurface& surface, std::span<const Vec3> x) {
   const contact::BodySurface own = contact::instrument_surface(shape);
   std::vector<Vec3> y;
   Box3 box;
@@ -540,7 +542,7 @@ bool is_inside(const InstrumentShape& shape, const Pose& pose, const contact::Mo
     Box3 other;
     for (const std::uint32_t v : of)
       other.add(x[v]);
-    return near(box, other, reach);
+    return contact::near(box, other, reach);
   };
   std::vector<std::array<std::uint32_t, 2>> edges = own.edges;
   for (const auto& t : own.triangles)
@@ -570,8 +572,9 @@ bool is_inside(const InstrumentShape& shape, const Pose& pose, const contact::Mo
 
 } // namespace
 
-Pose entry_pose(World& w, const InstrumentShape& shape, const Pose& pose) {
-  Pose start = pose;
+contact::Pose entry_pose(World& w, const contact::InstrumentShape& shape,
+                         const contact::Pose& pose) {
+  contact::Pose start = pose;
   if (shape.blade)
     return start;
   for (std::size_t o = 0; o < w.now.objects.size(); ++o) {
@@ -585,10 +588,11 @@ Pose entry_pose(World& w, const InstrumentShape& shape, const Pose& pose) {
     Box3 box;
     for (const Vec3& p : x)
       box.add(p);
-    if (!near(box, PlacedInstrument(shape, start).box()) || !is_inside(shape, start, surface, x))
+    if (!contact::near(box, contact::PlacedInstrument(shape, start).box()) ||
+        !is_inside(shape, start, surface, x))
       continue;
     // Out along its own axis, or by the nearest point of the surface.
-    Vec3 way = norm(shape.axis) > 0 ? rotated(start.turn, shape.axis) : Vec3{};
+    Vec3 way = norm(shape.axis) > 0 ? contact::rotated(start.turn, shape.axis) : Vec3{};
     if (way == Vec3{}) {
       double best = HUGE_VAL;
       for (const Vec3& p : x)
@@ -601,7 +605,7 @@ Pose entry_pose(World& w, const InstrumentShape& shape, const Pose& pose) {
       if (!(norm(way) > 0))
         way = {0, 0, 1};
     }
-    const double size = norm(box.size()) + 2 * (shape.radius + reach_of(shape));
+    const double size = norm(box.size()) + 2 * (shape.radius + contact::reach_of(shape));
     way = way / norm(way);
     double inside = 0, outside = size;
     while (is_inside(shape, {start.place + outside * way, start.turn}, surface, x) &&
@@ -642,8 +646,8 @@ void require_apart(World& w, const ContactRule& rule) {
       (rule.object == rule.other ? "the surface of object " + one + " passes itself"
                                  : "surfaces of objects " + one + " and " +
                                        w.now.objects[rule.other].name() + " pass each other") +
-      " near " + number_text(at.x) + " " + number_text(at.y) + " " + number_text(at.z) +
-      ", expected surfaces that stand apart, or contact " + one +
+      " near " + text::number_text(at.x) + " " + text::number_text(at.y) + " " +
+      text::number_text(at.z) + ", expected surfaces that stand apart, or contact " + one +
       (rule.object == rule.other ? " self" : " " + w.now.objects[rule.other].name()) + " separate");
 }
 
@@ -689,10 +693,10 @@ void require_outside(World& w, const ContactRule& rule, bool any) {
     for (const std::uint32_t v : vertices_of_components(of_inner.surface))
       if (winding(of_outer, y, x[v]) > 0.5)
         throw Error("the surface of object " + w.now.objects[inner].name() + " is inside object " +
-                    w.now.objects[outer].name() + " near " + number_text(x[v].x) + " " +
-                    number_text(x[v].y) + " " + number_text(x[v].z) +
+                    w.now.objects[outer].name() + " near " + text::number_text(x[v].x) + " " +
+                    text::number_text(x[v].y) + " " + text::number_text(x[v].z) +
                     ", expected surfaces that can be moved apart");
   }
 }
 
-} // namespace gewebe::simulation
+} // namespace gewebe::scene

@@ -9,9 +9,9 @@
 #include <algorithm>
 #include <utility>
 
-namespace gewebe::simulation {
+namespace gewebe::scene {
 
-void add_counts(ElastostaticCounts& sum, const ElastostaticCounts& more) {
+void add_counts(statics::ElastostaticCounts& sum, const statics::ElastostaticCounts& more) {
   sum.updates += more.updates;
   sum.unchanged += more.unchanged;
   sum.shapes += more.shapes;
@@ -29,17 +29,18 @@ void add_counts(ElastostaticCounts& sum, const ElastostaticCounts& more) {
   sum.change = std::max(sum.change, more.change);
 }
 
-void make_solver(const World& w, Object& object, std::shared_ptr<ComplianceSource> source) {
-  object.statics.solver =
-      std::make_shared<Elastostatic>(object.model(), std::move(source), w.context,
-                                     ElastostaticOptions{.measure_error = w.options.measure_error,
-                                                         .tolerance = w.options.tolerance,
-                                                         .may_be_free = true});
+void make_solver(const World& w, Object& object,
+                 std::shared_ptr<compliance::ComplianceSource> source) {
+  object.statics.solver = std::make_shared<statics::Elastostatic>(
+      object.model(), std::move(source), w.context,
+      statics::ElastostaticOptions{.measure_error = w.options.measure_error,
+                                   .tolerance = w.options.tolerance,
+                                   .may_be_free = true});
 }
 
 namespace {
 
-std::shared_ptr<ComplianceSource> source_of(Object& object) {
+std::shared_ptr<compliance::ComplianceSource> source_of(Object& object) {
   Statics& statics = object.statics;
   if (statics.prepared)
     return std::exchange(statics.prepared, nullptr);
@@ -49,10 +50,10 @@ std::shared_ptr<ComplianceSource> source_of(Object& object) {
 }
 
 /// What its solver did so far.
-ElastostaticCounts counts_of(const Statics& statics) {
+statics::ElastostaticCounts counts_of(const Statics& statics) {
   if (statics.strained) {
-    const SolidStaticCounts counts = statics.strained->counts();
-    ElastostaticCounts all;
+    const dynamics::SolidStaticCounts counts = statics.strained->counts();
+    statics::ElastostaticCounts all;
     all.updates = counts.updates;
     all.unchanged = counts.unchanged;
     all.shapes = counts.shapes;
@@ -61,9 +62,9 @@ ElastostaticCounts counts_of(const Statics& statics) {
     return all;
   }
   if (!statics.warped)
-    return statics.solver ? statics.solver->counts() : ElastostaticCounts{};
-  const WarpedCounts counts = statics.warped->counts();
-  ElastostaticCounts all;
+    return statics.solver ? statics.solver->counts() : statics::ElastostaticCounts{};
+  const statics::WarpedCounts counts = statics.warped->counts();
+  statics::ElastostaticCounts all;
   all.updates = counts.updates;
   all.unchanged = counts.unchanged;
   all.shapes = counts.shapes;
@@ -77,7 +78,7 @@ ElastostaticCounts counts_of(const Statics& statics) {
 
 } // namespace
 
-Elastostatic& solver_of(World& w, Object& object) {
+statics::Elastostatic& solver_of(World& w, Object& object) {
   need_model(object);
   Statics& statics = object.statics;
   if (!statics.solver)
@@ -85,11 +86,12 @@ Elastostatic& solver_of(World& w, Object& object) {
   return *statics.solver;
 }
 
-WarpedStatics& warped_of(World& w, Object& object) {
+statics::WarpedStatics& warped_of(World& w, Object& object) {
   need_model(object);
   Statics& statics = object.statics;
   if (!statics.warped) {
-    statics.warped = std::make_shared<WarpedStatics>(object.model(), source_of(object), w.context);
+    statics.warped =
+        std::make_shared<statics::WarpedStatics>(object.model(), source_of(object), w.context);
     statics.warped->restore(object.warped);
   }
   return *statics.warped;
@@ -98,12 +100,12 @@ WarpedStatics& warped_of(World& w, Object& object) {
 namespace {
 
 /// Where an object with a law stands, as the start of its first shape; null: at rest.
-std::shared_ptr<const SolidRest> shown_rest(const Object& object) {
+std::shared_ptr<const dynamics::SolidRest> shown_rest(const Object& object) {
   const std::vector<double>& u = *object.shown.displacement;
   if (!object.shown.shaped || u.size() != 3 * object.model().nodes.size() ||
       std::ranges::all_of(u, [](double x) { return x == 0; }))
     return nullptr;
-  auto rest = std::make_shared<SolidRest>();
+  auto rest = std::make_shared<dynamics::SolidRest>();
   rest->load = acting_load(object.shown);
   rest->balanced = false;
   for (std::size_t i = 0; i < object.model().nodes.size(); ++i)
@@ -115,32 +117,33 @@ std::shared_ptr<const SolidRest> shown_rest(const Object& object) {
 
 } // namespace
 
-SolidStatic& strained_of(World& w, Object& object) {
+dynamics::SolidStatic& strained_of(World& w, Object& object) {
   need_model(object);
-  std::shared_ptr<SolidStatic>& strained = object.statics.strained;
+  std::shared_ptr<dynamics::SolidStatic>& strained = object.statics.strained;
   if (strained)
     return *strained;
   if (!is_solid(object))
     throw Error("object " + object.name() +
                 " has no tetrahedra, expected a solid for law=, damping= and tolerance=");
-  if (!object.model().springs.empty() || body_count(object.model()) != object.model().nodes.size())
+  if (!object.model().springs.empty() ||
+      model::body_count(object.model()) != object.model().nodes.size())
     throw Error("object " + object.name() +
                 " has springs beside its tetrahedra, expected tetrahedra alone for law= at rest");
-  strained = std::make_shared<SolidStatic>(object.model(), *law_of(object), w.context);
+  strained = std::make_shared<dynamics::SolidStatic>(object.model(), *law_of(object), w.context);
   if (!object.strained)
     object.strained = shown_rest(object);
   strained->restore(object.strained);
   return *strained;
 }
 
-ElastostaticCounts static_counts(const Object& object) {
+statics::ElastostaticCounts static_counts(const Object& object) {
   const Statics& statics = object.statics;
-  ElastostaticCounts all = statics.spent;
+  statics::ElastostaticCounts all = statics.spent;
   add_counts(all, counts_of(statics));
   return all;
 }
 
-void update_solver(World& w, Object& object, const Load& load) {
+void update_solver(World& w, Object& object, const contact::Load& load) {
   if (object.shown.rough)
     shape_in_step(w, object); // while the solver is at that load
   update_stages(w, object, load);
@@ -154,7 +157,7 @@ void drop_solvers(Object& object) {
   statics.strained.reset();
   statics.reach.reset();
   if (statics.two_step) {
-    ElastostaticCounts second = statics.two_step->second_counts();
+    statics::ElastostaticCounts second = statics.two_step->second_counts();
     second.updates = second.unchanged = 0; // those of the first stage count
     add_counts(statics.spent, second);
     statics.two_step.reset();
@@ -165,29 +168,29 @@ void drop_solvers(Object& object) {
 }
 
 /// \pre it has stages
-TwoStep& two_step_of(World& w, Object& object) {
-  std::shared_ptr<TwoStep>& two_step = object.statics.two_step;
+statics::TwoStep& two_step_of(World& w, Object& object) {
+  std::shared_ptr<statics::TwoStep>& two_step = object.statics.two_step;
   if (!two_step)
-    two_step = std::make_shared<TwoStep>(object.model(), object.stages.second(), w.context,
-                                         *object.stages.options, w.options.tolerance);
+    two_step = std::make_shared<statics::TwoStep>(object.model(), object.stages.second(), w.context,
+                                                  *object.stages.options, w.options.tolerance);
   return *two_step;
 }
 
-void update_stages(World& w, Object& object, const Load& load) {
+void update_stages(World& w, Object& object, const contact::Load& load) {
   if (has_law(object)) {
-    SolidStatic& strained = strained_of(w, object);
+    dynamics::SolidStatic& strained = strained_of(w, object);
     strained.restore(object.strained); // whatever was sought since
     strained.update(load, rest_time(w, object, w.now.clock.time));
     object.strained = strained.answer();
     return;
   }
   if (object.warp) {
-    WarpedStatics& warped = warped_of(w, object);
+    statics::WarpedStatics& warped = warped_of(w, object);
     warped.update(load);
     object.warped = warped.answer();
     return;
   }
-  Elastostatic& solver = solver_of(w, object);
+  statics::Elastostatic& solver = solver_of(w, object);
   if (object.stages.options)
     two_step_of(w, object).update(solver, load);
   else
@@ -232,7 +235,7 @@ void verify_shape(Object& object) {
     statics.solver->verify();
 }
 
-std::vector<NodeVector> static_forces(const Object& object) {
+std::vector<contact::NodeVector> static_forces(const Object& object) {
   const Statics& statics = object.statics;
   if (statics.strained)
     return statics.strained->holding_forces();
@@ -244,11 +247,11 @@ std::vector<NodeVector> static_forces(const Object& object) {
 namespace {
 
 /// Goes on with this model of the second stage.
-void set_second(const World& w, Object& object, std::shared_ptr<const Model> model) {
+void set_second(const World& w, Object& object, std::shared_ptr<const model::Model> model) {
   object.stages.model = model;
   object.stages.second = [context = w.context, model = std::move(model)] {
-    return compliance_of_factor(
-        [context, model] { return Factor(stiffness_matrix(*model), context); });
+    return compliance::compliance_of_factor(
+        [context, model] { return linalg::Factor(fem::stiffness_matrix(*model), context); });
   };
 }
 
@@ -259,8 +262,8 @@ void follow_cut(const World& w, const Object& old, std::span<const std::uint32_t
                 Object& next) {
   if (old.stages.model)
     set_second(w, next,
-               std::make_shared<const Model>(
-                   cut_second_stage(next.model(), origin, old.model(), *old.stages.model)));
+               std::make_shared<const model::Model>(statics::cut_second_stage(
+                   next.model(), origin, old.model(), *old.stages.model)));
 }
 
 /// That of an object that is as it came again.
@@ -295,7 +298,7 @@ void Rule<SetTwoStep>::check(World& w, const SetTwoStep& c) {
   if (!c.model)
     return;
   need_model(object);
-  if (!same_but_stiffness(object.cut.first ? *object.cut.first : object.model(), *c.model))
+  if (!statics::same_but_stiffness(object.cut.first ? *object.cut.first : object.model(), *c.model))
     throw Error("object " + object.name() +
                 " and the model of its second stage differ in more than stiffness, expected the "
                 "same nodes, springs and triangles");
@@ -324,4 +327,4 @@ void Rule<SetTwoStep>::log(const World&, const SetTwoStep& c, ChangeRow& row) {
   row.text = c.options.series ? "series" : "";
 }
 
-} // namespace gewebe::simulation
+} // namespace gewebe::scene

@@ -7,7 +7,7 @@
 
 #include <string>
 
-namespace gewebe::simulation {
+namespace gewebe::scene {
 
 namespace {
 
@@ -36,7 +36,7 @@ bool goes(const Object& object, Way way) {
   case Way::sprung:
     return object.matter->known && is_solid(object) &&
            (!object.model().springs.empty() ||
-            body_count(object.model()) != object.model().nodes.size());
+            model::body_count(object.model()) != object.model().nodes.size());
   case Way::net:
     return object.matter->known && object.model().tetrahedra.empty();
   case Way::solid_motion:
@@ -46,7 +46,7 @@ bool goes(const Object& object, Way way) {
   case Way::strained:
     return !moves && has_law(object);
   case Way::viscoelastic:
-    return object.matter->known && is_viscoelastic(object.model());
+    return object.matter->known && dynamics::is_viscoelastic(object.model());
   case Way::filled:
     return object.matter->solid.bulk.has_value();
   }
@@ -90,4 +90,4 @@ bool feels(const World& w, Object& object, Feature feature) {
   return false;
 }
 
-} // namespace gewebe::simulation
+} // namespace gewebe::scene

@@ -6,7 +6,7 @@
 #include <cstdint>
 #include <string_view>
 
-namespace gewebe {
+namespace gewebe::scene {
 
 /// Trait of an object. It may have several: cut and elastostatic, attached and implicit.
 enum class Way : std::uint8_t {
@@ -132,4 +132,4 @@ constexpr const Gap* gap(Way way, Feature feature) {
   return nullptr;
 }
 
-} // namespace gewebe
+} // namespace gewebe::scene

@@ -11,7 +11,7 @@
 #include <utility>
 #include <vector>
 
-namespace gewebe::simulation {
+namespace gewebe::scene {
 
 namespace {
 
@@ -20,19 +20,19 @@ constexpr int most_attempts = 4; // until something comes apart
 /// What strains of a solid are found by.
 struct Strained {
   std::vector<double> u; // 3 n, or none at rest
-  StrainFrames frames = StrainFrames::resting;
+  fem::StrainFrames frames = fem::StrainFrames::resting;
 };
 
 Strained strained(World& w, Object& object) {
   Strained found;
   if (object.body != nullptr) {
-    found.frames = StrainFrames::elements;
-    for (const NodeMotion& m : motion_of(object))
+    found.frames = fem::StrainFrames::elements;
+    for (const dynamics::NodeMotion& m : motion_of(object))
       found.u.insert(found.u.end(), {m.displacement.x, m.displacement.y, m.displacement.z});
   } else if (object.method == Method::ffe) {
     std::span<const double> u = whole_shape_in_step(w, object);
     if (has_law(object))
-      found.frames = StrainFrames::elements;
+      found.frames = fem::StrainFrames::elements;
     else if (object.warped)
       u = warped_of(w, object).local_displacement();
     found.u.assign(u.begin(), u.end());
@@ -40,16 +40,16 @@ Strained strained(World& w, Object& object) {
   return found;
 }
 
-std::string limit_text(const TearLimit& limit) {
+std::string limit_text(const cutting::TearLimit& limit) {
   std::string text = limit.stress ? "stress" : "strain";
   for (const double one : limit.most)
-    text += " " + number_text(one);
+    text += " " + text::number_text(one);
   if (limit.over > 0)
-    text += " over " + number_text(limit.over);
+    text += " over " + text::number_text(limit.over);
   return text;
 }
 
-void require_limit(const Object& object, const TearLimit& limit) {
+void require_limit(const Object& object, const cutting::TearLimit& limit) {
   if (limit.most.size() > 1 && limit.most.size() != object.model().materials.size())
     throw Error("object " + object.name() + ": " + std::to_string(limit.most.size()) +
                 " limits to tear at, expected one or those of its " +
@@ -61,14 +61,15 @@ void require_limit(const Object& object, const TearLimit& limit) {
 }
 
 /// The skin goes along where it can: else it spans the tear until what holds it comes off.
-std::optional<CutModel> part_at(World& w, std::size_t index, const SolidTear& tear) {
+std::optional<cutting::CutModel> part_at(World& w, std::size_t index,
+                                         const cutting::SolidTear& tear) {
   const PlaneToCut plane{tear.plane, tear.nodes, true};
   try {
     return cut_by_plane(w, index, plane);
-  } catch (const MeetingOfNoSheets& error) {
+  } catch (const mesh::MeetingOfNoSheets& error) {
     if (w.options.warn)
       w.options.warn("object " + w.now.objects[index].name() + " at " +
-                     number_text(w.now.clock.time) +
+                     text::number_text(w.now.clock.time) +
                      " s: its skin is not torn by this step: " + error.what());
     return cut_by_plane(w, index, plane, false);
   }
@@ -76,7 +77,7 @@ std::optional<CutModel> part_at(World& w, std::size_t index, const SolidTear& te
 
 void tear_solid(World& w, std::size_t index) {
   Object& object = w.now.objects[index];
-  const TearLimit limit = object.cut.limit;
+  const cutting::TearLimit limit = object.cut.limit;
   if (!limit.any() || !may_cut(w, object, Feature::tear))
     return;
   require_limit(object, limit);
@@ -84,20 +85,20 @@ void tear_solid(World& w, std::size_t index) {
   if (is.u.empty())
     return;
   for (int attempt = 0; attempt < most_attempts; ++attempt) {
-    const std::optional<SolidTear> tear =
-        find_tear(object.model(), is.u, is.frames, limit, attempt);
+    const std::optional<cutting::SolidTear> tear =
+        cutting::find_tear(object.model(), is.u, is.frames, limit, attempt);
     if (!tear)
       return;
-    if (std::optional<CutModel> cut = part_at(w, index, *tear)) {
+    if (std::optional<cutting::CutModel> cut = part_at(w, index, *tear)) {
       carry_out(w, index, std::move(*cut));
       return;
     }
     bool& told = object.matter->told.untorn;
     if (attempt + 1 == most_attempts && w.options.warn && !told) {
       told = true;
-      w.options.warn("object " + object.name() + " at " + number_text(w.now.clock.time) +
+      w.options.warn("object " + object.name() + " at " + text::number_text(w.now.clock.time) +
                      " s: element " + std::to_string(tear->tetrahedron) + " bears " +
-                     number_text(tear->share) +
+                     text::number_text(tear->share) +
                      " times its limit, but no faces near it come apart");
     }
   }
@@ -110,18 +111,20 @@ void tear(World& w) {
   for (std::size_t index = 0; index < count; ++index) {
     Object& object = w.now.objects[index];
     if (object.matter->known && is_solid(object)) {
-      of_object(object.name() + " at " + number_text(w.now.clock.time) + " s",
+      of_object(object.name() + " at " + text::number_text(w.now.clock.time) + " s",
                 [&] { tear_solid(w, index); });
       continue;
     }
     if (!(object.cut.tear > 0) || !may_cut(w, object, Feature::tear))
       continue;
     shape_in_step(w, object);
-    const Cut torn = torn_cut(object.model(), *object.shown.displacement, object.cut.tear);
+    const cutting::Cut torn =
+        cutting::torn_cut(object.model(), *object.shown.displacement, object.cut.tear);
     if (torn.empty())
       continue;
-    of_object(object.name() + " at " + number_text(w.now.clock.time) + " s", [&] {
-      CutModel cut = cut_model(object.model(), merged(torn, object.cut.scored));
+    of_object(object.name() + " at " + text::number_text(w.now.clock.time) + " s", [&] {
+      cutting::CutModel cut =
+          cutting::cut_model(object.model(), cutting::merged(torn, object.cut.scored));
       if (cut.changed())
         carry_out(w, index, std::move(cut));
     });
@@ -130,7 +133,7 @@ void tear(World& w) {
 
 void Rule<SetTear>::apply(World& w, const SetTear& c) {
   Object& object = w.now.objects.at(c.object);
-  TearLimit limit = c.limit;
+  cutting::TearLimit limit = c.limit;
   if (limit.most.empty() && c.strain > 0)
     limit.most = {c.strain};
   if (!c.limit.most.empty()) {
@@ -152,4 +155,4 @@ void Rule<SetTear>::log(const World&, const SetTear& c, ChangeRow& row) {
     row.text = limit_text(c.limit);
 }
 
-} // namespace gewebe::simulation
+} // namespace gewebe::scene

@@ -11,7 +11,7 @@
 #include <utility>
 #include <vector>
 
-namespace gewebe::simulation {
+namespace gewebe::scene {
 
 namespace {
 
@@ -25,7 +25,8 @@ void require_few_events(const World& w, double to) {
     if (event.period > 0 && time <= to)
       count += (to - time) / event.period;
   if (!(count <= max_events))
-    throw Error("a step to " + number_text(to) + " s holds " + number_text(std::round(count)) +
+    throw Error("a step to " + text::number_text(to) + " s holds " +
+                text::number_text(std::round(count)) +
                 " repeated events, expected at most a million: a shorter step, or at every with a "
                 "longer time");
 }
@@ -47,7 +48,7 @@ void take_effect_first(World& w) {
     ++event.round;
     const double next = event.origin + event.round * event.period;
     if (!(next > w.now.clock.time))
-      throw Error("the period " + number_text(event.period) +
+      throw Error("the period " + text::number_text(event.period) +
                   " s is lost in the rounding of the time, expected a longer one");
     events.emplace(next, std::move(event));
   }
@@ -148,4 +149,4 @@ void advance(World& w, double to) {
   ++w.now.counts.steps;
 }
 
-} // namespace gewebe::simulation
+} // namespace gewebe::scene

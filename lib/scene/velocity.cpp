@@ -9,7 +9,7 @@
 #include <utility>
 #include <vector>
 
-namespace gewebe::simulation {
+namespace gewebe::scene {
 
 /// To be called before a new output state of an object: the present one becomes the previous state.
 void leave_shown(World& w, Object& object) {
@@ -25,7 +25,7 @@ void leave_shown(World& w, Object& object) {
                 .touched = {},
                 .duration = shown.posed && posed ? now - before : 0,
                 .velocity = {}};
-  for (const NodalContactForce& t : shown.contact)
+  for (const contact::NodalContactForce& t : shown.contact)
     if (posed)
       came.touched[t.node] = contact_displacement(object, t.node);
   object.came = std::move(came);
@@ -46,11 +46,11 @@ std::vector<Vec3> shape_velocity(World& w, Object& object, bool afresh) {
     return object.came.velocity;
   if (!has_moved(w, object))
     return {};
-  Load load = *object.came.load, now = *object.shown.load;
+  contact::Load load = *object.came.load, now = *object.shown.load;
   // Nodes that instruments push are where they are.
   for (const auto& [node, u] : object.came.touched)
     load.displacement[node] = u;
-  for (const NodalContactForce& t : object.shown.contact)
+  for (const contact::NodalContactForce& t : object.shown.contact)
     now.displacement[t.node] = contact_displacement(object, t.node);
   std::vector<Vec3> velocity;
   const auto between = [&](std::span<const double> before, std::span<const double> after) {
@@ -59,10 +59,10 @@ std::vector<Vec3> shape_velocity(World& w, Object& object, bool afresh) {
   };
   try {
     if (has_law(object)) {
-      std::optional<SolidStatic> own;
+      std::optional<dynamics::SolidStatic> own;
       if (afresh)
         own.emplace(object.model(), *law_of(object), w.context);
-      SolidStatic& strained = afresh ? *own : strained_of(w, object);
+      dynamics::SolidStatic& strained = afresh ? *own : strained_of(w, object);
       strained.update(load);
       const std::span<const double> shape = strained.displacement();
       const std::vector<double> before(shape.begin(), shape.end());
@@ -71,10 +71,10 @@ std::vector<Vec3> shape_velocity(World& w, Object& object, bool afresh) {
       return velocity;
     }
     if (object.warp) {
-      std::optional<WarpedStatics> own;
+      std::optional<statics::WarpedStatics> own;
       if (afresh)
         own.emplace(object.model(), nullptr, w.context);
-      WarpedStatics& warped = afresh ? *own : warped_of(w, object);
+      statics::WarpedStatics& warped = afresh ? *own : warped_of(w, object);
       warped.update(load);
       const std::span<const double> shape = warped.displacement();
       const std::vector<double> before(shape.begin(), shape.end());
@@ -82,29 +82,29 @@ std::vector<Vec3> shape_velocity(World& w, Object& object, bool afresh) {
       between(before, warped.displacement());
       return velocity;
     }
-    std::optional<Elastostatic> own;
-    std::optional<TwoStep> own_stages;
+    std::optional<statics::Elastostatic> own;
+    std::optional<statics::TwoStep> own_stages;
     if (afresh)
       own.emplace(object.model(), nullptr, w.context);
     if (afresh && object.stages.options)
       own_stages.emplace(object.model(), object.stages.second(), w.context, *object.stages.options);
-    Elastostatic& solver = afresh ? *own : solver_of(w, object);
-    const auto shape_under = [&](const Load& acting) {
+    statics::Elastostatic& solver = afresh ? *own : solver_of(w, object);
+    const auto shape_under = [&](const contact::Load& acting) {
       if (!object.stages.options) {
         solver.update(acting);
         return solver.displacement();
       }
-      TwoStep& both = afresh ? *own_stages : two_step_of(w, object);
+      statics::TwoStep& both = afresh ? *own_stages : two_step_of(w, object);
       both.update(solver, acting);
       return both.displacement(solver);
     };
     const std::span<const double> shape = shape_under(load);
     const std::vector<double> before(shape.begin(), shape.end());
     between(before, shape_under(now));
-  } catch (const SingularStiffness&) {
+  } catch (const linalg::SingularStiffness&) {
     // The object is free to move, and no shape has been computed since.
   }
   return velocity;
 }
 
-} // namespace gewebe::simulation
+} // namespace gewebe::scene

@@ -18,9 +18,7 @@
 #include <utility>
 #include <vector>
 
-namespace gewebe::simulation {
-
-using gewebe::number_text;
+namespace gewebe::scene {
 
 /// Bound for numbers that are written in single precision too, with room for sums.
 inline constexpr double largest_number = 1e38;
@@ -67,12 +65,12 @@ void need_model(Object& object);
 
 /// Whether the model holds all of its nodes. \pre its model is known
 inline bool is_held_altogether(const Object& object) {
-  return std::ranges::all_of(object.model().nodes,
-                             [](const Node& node) { return node.fixed == fixed_all; });
+  return std::ranges::all_of(
+      object.model().nodes, [](const model::Node& node) { return node.fixed == model::fixed_all; });
 }
 
 /// Law of large strains that is chosen for an object or, if its model is known, that of a material.
-std::optional<SolidLaw> law_of(const Object& object);
+std::optional<integrator::SolidLaw> law_of(const Object& object);
 /// Whether its shape at rest is that of large strains, see dynamics/solid_static.h.
 inline bool has_law(const Object& object) {
   return law_of(object).has_value();
@@ -81,7 +79,7 @@ inline bool has_law(const Object& object) {
 /// Whether it is a viscoelastic solid at rest, whose shape depends on time.
 bool relaxes(const Object& object);
 /// The time that passes until its shape at `end`. \pre relaxes(object)
-RestTime rest_time(const World& w, const Object& object, double end);
+dynamics::RestTime rest_time(const World& w, const Object& object, double end);
 
 /// Marks the output state and the body of an object as out of date.
 inline void touch(Object& object) {
@@ -107,7 +105,7 @@ void at_object(const World& w, const Object& object, Work&& work) {
   } catch (const ObjectError&) {
     throw;
   } catch (const Error& error) {
-    throw ObjectError("object " + object.name() + " at " + number_text(w.now.clock.time) +
+    throw ObjectError("object " + object.name() + " at " + text::number_text(w.now.clock.time) +
                       " s: " + (error.place().empty() ? "" : error.place() + ": ") + error.what());
   }
 }
@@ -121,23 +119,24 @@ void require_support(const World& w, const Object& object, Feature feature);
 bool feels(const World& w, Object& object, Feature feature);
 
 // statics.cpp: solvers of elastostatic objects, of the one-step and the two-step method
-Elastostatic& solver_of(World& w, Object& object);
-WarpedStatics& warped_of(World& w, Object& object);
+statics::Elastostatic& solver_of(World& w, Object& object);
+statics::WarpedStatics& warped_of(World& w, Object& object);
 /// \pre it has a law \throw Error if the object is no solid of tetrahedra alone
-SolidStatic& strained_of(World& w, Object& object);
-ElastostaticCounts static_counts(const Object& object);
-void make_solver(const World& w, Object& object, std::shared_ptr<ComplianceSource> source);
-void update_solver(World& w, Object& object, const Load& load);
+dynamics::SolidStatic& strained_of(World& w, Object& object);
+statics::ElastostaticCounts static_counts(const Object& object);
+void make_solver(const World& w, Object& object,
+                 std::shared_ptr<compliance::ComplianceSource> source);
+void update_solver(World& w, Object& object, const contact::Load& load);
 /// Drops the solvers of an object: factors, columns, running sums.
 void drop_solvers(Object& object);
 /// Adds counts; errors become the larger of both.
-void add_counts(ElastostaticCounts& sum, const ElastostaticCounts& more);
-void add_counts(SolidStepCounts& sum, const SolidStepCounts& more);
-TwoStep& two_step_of(World& w, Object& object);
+void add_counts(statics::ElastostaticCounts& sum, const statics::ElastostaticCounts& more);
+void add_counts(dynamics::SolidStepCounts& sum, const dynamics::SolidStepCounts& more);
+statics::TwoStep& two_step_of(World& w, Object& object);
 void follow_cut(const World& w, const Object& old, std::span<const std::uint32_t> origin,
                 Object& next);
 void make_whole(const World& w, Object& object);
-void update_stages(World& w, Object& object, const Load& load);
+void update_stages(World& w, Object& object, const contact::Load& load);
 /// Displacement of all nodes.
 std::span<const double> static_shape(Object& object);
 /// Displacement of the nodes that the solver has rows for: at least those of the surface.
@@ -146,19 +145,19 @@ std::span<const double> static_surface(Object& object);
 std::span<const double> static_rough_surface(Object& object);
 /// Measures the error of a shape that no caller has read.
 void verify_shape(Object& object);
-std::vector<NodeVector> static_forces(const Object& object);
+std::vector<contact::NodeVector> static_forces(const Object& object);
 
 // bodies.cpp: bodies of one object, or of several that are attached to each other
-using Motions = std::map<std::size_t, std::vector<NodeMotion>>;
+using Motions = std::map<std::size_t, std::vector<dynamics::NodeMotion>>;
 void need_body(World& w, std::size_t object);
 /// All parts as one model, without the springs that attach them.
 /// \param offset  becomes the first node of each part
-Model joined_model(const World& w, std::span<const std::size_t> parts,
-                   std::vector<std::size_t>& offset);
+model::Model joined_model(const World& w, std::span<const std::size_t> parts,
+                          std::vector<std::size_t>& offset);
 std::shared_ptr<Body> make_body(World& w, std::vector<std::size_t> parts,
                                 const Motions* motions = nullptr);
 /// Model of an object, with the masses that SetMass has added.
-Model weighed_model(const Object& object);
+model::Model weighed_model(const Object& object);
 /// Replaces the body of an object after a change of masses. Its motion stays.
 void make_body_again(World& w, std::size_t object);
 /// Replaces a body by one with implicit steps. Its motion stays.
@@ -182,7 +181,7 @@ inline bool moves_implicitly(const Object& object) {
   return object.integration == Integration::implicit || is_solid(object);
 }
 /// Positions and velocities of an object's nodes. \pre it has a body
-std::span<const NodeMotion> motion_of(const Object& object);
+std::span<const dynamics::NodeMotion> motion_of(const Object& object);
 
 // islands.cpp: islands of objects and instruments in contact
 /// Advances all bodies to time `to`, with contact.
@@ -199,7 +198,8 @@ std::vector<std::uint8_t> show_static_contacts(World& w);
 /// Objects that may share an island with this one, by ties and contact, itself included.
 std::vector<std::size_t> together(const World& w, std::size_t object);
 /// Start pose of an instrument that appears at `pose`: outside of all objects.
-Pose entry_pose(World& w, const InstrumentShape& shape, const Pose& pose);
+contact::Pose entry_pose(World& w, const contact::InstrumentShape& shape,
+                         const contact::Pose& pose);
 /// Requires that surfaces that may touch do not intersect.
 /// \throw Error naming objects and position
 void require_apart(World& w, const ContactRule& rule);
@@ -219,7 +219,7 @@ void show_in_motion(World& w, Object& object);
 void begin_showing(World& w, Object& object);
 void end_showing(World& w, Object& object);
 /// Load of an object at a time, with the weight of added masses. \pre its model is known
-Load acting_at(const Object& object, double time);
+contact::Load acting_at(const Object& object, double time);
 /// Copies the present load to the output state.
 void load_shown(const World& w, Object& object);
 /// Warns, once per object, if a shape leaves the range of linear elasticity.
@@ -234,7 +234,7 @@ void shape_in_step(World& w, Object& object);
 std::span<const double> whole_shape(World& w, Object& object);
 std::span<const double> whole_shape_in_step(World& w, Object& object);
 /// The load that belongs to a displacement, with contact forces.
-Load acting_load(const Shown& shown);
+contact::Load acting_load(const Shown& shown);
 /// Displacement as known: of all nodes if that was computed, else of the first ones. \pre shaped
 std::span<const double> known_shape(const Object& object);
 double displacement_limit(Object& object);
@@ -255,7 +255,7 @@ void let_instruments_enter(World& w);
 void drop_grips(World& w, std::size_t object, const std::vector<std::uint32_t>& nodes);
 void note_poses(World& w, std::optional<std::size_t> jumps = {});
 bool instruments_there(const World& w);
-std::optional<Pose> pose_at(const World& w, std::size_t moment, std::size_t instrument);
+std::optional<contact::Pose> pose_at(const World& w, std::size_t moment, std::size_t instrument);
 
 void add_contact_forces(Object& object);
 
@@ -264,7 +264,7 @@ void announce_cut(World& w, std::size_t index);
 void find_deferred_shape(World& w, Object& object);
 void sweep_blades(World& w);
 void find_free_motion(World& w, std::size_t index);
-void carry_out(World& w, std::size_t index, CutModel cut);
+void carry_out(World& w, std::size_t index, cutting::CutModel cut);
 bool may_cut(World& w, Object& object, Feature feature);
 /// Runs `work`; adds the object's name to an Error that it throws.
 template <class Work>
@@ -282,14 +282,14 @@ auto of_object(const std::string& name, Work&& work) {
 /// Area swept by a blade since the last step, nearly flat.
 struct BladeArea {
   std::size_t instrument = 0;
-  SweptQuad corners{};
+  cutting::SweptQuad corners{};
 };
 /// \throw Error if the plane parts nothing
-CutModel plane_through(const World& w, std::size_t index, const PlaneToCut& plane);
+cutting::CutModel plane_through(const World& w, std::size_t index, const PlaneToCut& plane);
 /// The same, or empty if the plane parts nothing.
 /// \param skin_too  cuts the embedded surface too
-std::optional<CutModel> cut_by_plane(const World& w, std::size_t index, const PlaneToCut& plane,
-                                     bool skin_too = true);
+std::optional<cutting::CutModel> cut_by_plane(const World& w, std::size_t index,
+                                              const PlaneToCut& plane, bool skin_too = true);
 void sweep_solid(World& w, std::size_t index, std::span<const BladeArea> areas);
 
 // wound_walls.cpp: walls of cuts in contact
@@ -318,7 +318,7 @@ std::vector<std::size_t> separate_overlaps(World& w, std::span<const ContactRule
 void tear(World& w);
 
 // moves.cpp: renumbering of nodes after a cut
-Object renumbered(const Object& old, std::shared_ptr<const Model> model);
+Object renumbered(const Object& old, std::shared_ptr<const model::Model> model);
 /// A vector field over the old nodes, renumbered to the nodes of one new object.
 std::vector<double> moved_field(const Moves& moves, std::size_t object,
                                 std::span<const double> field);
@@ -326,4 +326,4 @@ void move_all(World& w, std::size_t index, const Moves& moves, std::deque<Object
               std::span<const Vec3> velocity = {});
 void renew_bodies(World& w, const Motions& motions);
 
-} // namespace gewebe::simulation
+} // namespace gewebe::scene

@@ -16,7 +16,7 @@
 #include <utility>
 #include <vector>
 
-namespace gewebe::simulation {
+namespace gewebe::scene {
 
 namespace {
 
@@ -124,7 +124,7 @@ private:
   }
 
   void add(const Object& object, std::size_t index, const Motions& motions) {
-    const Model& model = object.model();
+    const model::Model& model = object.model();
     std::map<std::uint32_t, SurfaceNode> nodes;
     std::map<std::pair<std::uint32_t, std::uint32_t>, int> triangles_of_edge;
     for (const Triangle& t : model.triangles)
@@ -134,7 +134,8 @@ private:
       return model.nodes[node].position + displacement_of(object, motions, index, node);
     };
     const auto is_held = [&](std::uint32_t node) {
-      return model.nodes[node].fixed == fixed_all || object.load->displacement.contains(node);
+      return model.nodes[node].fixed == model::fixed_all ||
+             object.load->displacement.contains(node);
     };
     for (const Triangle& t : model.triangles) {
       const bool has_free = !std::ranges::all_of(t, is_held);
@@ -196,13 +197,13 @@ std::vector<Vec3> parting_directions(std::span<const SurfaceNode> group) {
 void move_node(World& w, std::size_t index, std::uint32_t node, Vec3 by, Motions& motions) {
   Object& object = w.now.objects[index];
   for (int a = 0; a < 3; ++a)
-    if (is_fixed(object.model(), node, a))
+    if (contact::is_fixed(object.model(), node, a))
       by[a] = 0;
   object.shown.valid = false;
   object.shown.whole = {};
   object.shown.box.reset();
   if (object.method == Method::ela) {
-    std::vector<NodeMotion>& motion = motions[index];
+    std::vector<dynamics::NodeMotion>& motion = motions[index];
     motion.resize(object.model().nodes.size());
     motion[node].displacement += by;
     return;
@@ -252,4 +253,4 @@ std::vector<std::size_t> separate_walls(World& w, std::span<const std::size_t> o
   return {moved.begin(), moved.end()};
 }
 
-} // namespace gewebe::simulation
+} // namespace gewebe::scene

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-namespace gewebe {
+namespace gewebe::shading {
 namespace {
 
 constexpr double pi = 3.14159265358979323846;
@@ -58,4 +58,4 @@ std::array<double, 2> cos_sin(double degrees) {
   }
 }
 
-} // namespace gewebe
+} // namespace gewebe::shading

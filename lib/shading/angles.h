@@ -4,7 +4,7 @@
 
 #include <array>
 
-namespace gewebe {
+namespace gewebe::shading {
 
 /// tan of an angle in degrees, relative error below 1e-13. \pre 0 <= degrees < 90
 double tangent(double degrees);
@@ -16,4 +16,4 @@ std::array<double, 2> cos_sin(double degrees);
 /// rounding), error below 1e-15; 0 for (0, 0).
 double turn(double x, double y);
 
-} // namespace gewebe
+} // namespace gewebe::shading

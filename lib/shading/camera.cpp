@@ -6,7 +6,7 @@
 #include <algorithm>
 #include <cmath>
 
-namespace gewebe {
+namespace gewebe::shading {
 namespace {
 
 struct View {
@@ -146,4 +146,4 @@ Projection make_projection(const Camera& camera, const Box3& drawn, const Vec3& 
   return projection;
 }
 
-} // namespace gewebe
+} // namespace gewebe::shading

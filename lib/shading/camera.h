@@ -10,7 +10,7 @@
 #include <string_view>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::shading {
 
 /// The words of --view: front, back, left, right, top, bottom, iso.
 const std::vector<std::string>& view_names();
@@ -54,4 +54,4 @@ struct Projection {
 Projection make_projection(const Camera& camera, const Box3& drawn, const Vec3& origin,
                            double scale);
 
-} // namespace gewebe
+} // namespace gewebe::shading

@@ -15,7 +15,7 @@
 // Based on: report FZKA 7190, 2006, section 3.2.3; Lengyel, Mathematics for 3D Game Programming and
 // Computer Graphics, 2003 (emboss bump mapping).
 
-namespace gewebe {
+namespace gewebe::shading {
 namespace {
 
 /// One vertex a point, for pictures without textures.
@@ -166,7 +166,7 @@ void append_rests(Drawing& drawing, const Surface& surface, const DrawingParts& 
   drawing.rests.resize(drawing.vertices.size());
   for (std::size_t v = 0; v < point.size(); ++v) {
     const std::uint32_t p = point[v];
-    DrawRest& out = drawing.rests[base + v];
+    texture::DrawRest& out = drawing.rests[base + v];
     out.place = in_floats((rest[p] - drawing.rest_origin) / drawing.rest_scale);
     if (!parts.rest_normals.empty())
       out.normal = in_floats(parts.rest_normals[p]);
@@ -178,9 +178,9 @@ void append_turns(Drawing& drawing, const Surface& surface, const DrawingParts& 
   const TriangleMesh& mesh = surface.mesh;
   const std::vector<std::uint32_t>& point = parts.vertices.point;
   if (parts.moved) {
-    const std::vector<DrawTurn> turns =
-        rest_turns(surface.rest, parts.rest_normals, mesh.points,
-                   area_normals(mesh.points, mesh.triangles), mesh.triangles);
+    const std::vector<texture::DrawTurn> turns =
+        texture::rest_turns(surface.rest, parts.rest_normals, mesh.points,
+                            area_normals(mesh.points, mesh.triangles), mesh.triangles);
     drawing.turns.resize(drawing.vertices.size() - point.size());
     for (const std::uint32_t p : point)
       drawing.turns.push_back(turns[p]);
@@ -368,4 +368,4 @@ Box3 rest_box(std::span<const Surface> surfaces) {
   return box;
 }
 
-} // namespace gewebe
+} // namespace gewebe::shading

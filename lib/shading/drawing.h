@@ -17,7 +17,7 @@
 #include <utility>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::shading {
 
 /// In single precision, as OpenGL takes them, so that all ways of drawing have the same geometry.
 struct DrawVertex {
@@ -40,9 +40,9 @@ struct Drawing {
   Vec3 origin;
   double scale = 1; ///< > 0
   std::vector<DrawVertex> vertices;
-  std::vector<DrawFrame> frames; ///< one per vertex if requested, else none
-  std::vector<DrawRest> rests;   ///< one per vertex if requested, else none
-  std::vector<DrawTurn> turns;   ///< likewise, where a point is not at rest
+  std::vector<DrawFrame> frames;        ///< one per vertex if requested, else none
+  std::vector<texture::DrawRest> rests; ///< one per vertex if requested, else none
+  std::vector<texture::DrawTurn> turns; ///< likewise, where a point is not at rest
   Vec3 rest_origin;
   double rest_scale = 1; ///< > 0
   std::vector<Triangle> triangles;
@@ -169,4 +169,4 @@ std::uint64_t triangle_count(std::span<const Surface> surfaces);
 /// The box of the rest shapes of all surfaces but instruments.
 Box3 rest_box(std::span<const Surface> surfaces);
 
-} // namespace gewebe
+} // namespace gewebe::shading

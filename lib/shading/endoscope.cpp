@@ -6,13 +6,13 @@
 #include <cmath>
 #include <cstddef>
 
-namespace gewebe {
+namespace gewebe::shading {
 
 Vec3 endoscope_light(const Camera& camera) {
   return camera.eye + camera.up * endoscope_light_height;
 }
 
-void look_through_endoscope(Image& image, const Camera& camera) {
+void look_through_endoscope(texture::Image& image, const Camera& camera) {
   constexpr double rim = 0.5, flat = 0.35; // of the light's cone
   const double half = std::min(image.width, image.height) / 2.0;
   std::size_t at = 0;
@@ -27,8 +27,8 @@ void look_through_endoscope(Image& image, const Camera& camera) {
       const double cone = 1 - (1 - rim) * s * s * (3 - 2 * s);
       const double stop = std::clamp(half - from_middle + 0.5, 0.0, 1.0);
       for (int c = 0; c < 3; ++c, ++at)
-        image.values[at] = stored(image.values[at] / 255.0 * lens * cone * stop);
+        image.values[at] = texture::stored(image.values[at] / 255.0 * lens * cone * stop);
     }
 }
 
-} // namespace gewebe
+} // namespace gewebe::shading

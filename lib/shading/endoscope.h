@@ -5,7 +5,7 @@
 #include "shading/camera.h"
 #include "texture/image.h"
 
-namespace gewebe {
+namespace gewebe::shading {
 
 /// Of the light above the lens, mm.
 inline constexpr double endoscope_light_height = 3;
@@ -28,6 +28,6 @@ inline double light_left(double full, double distance) {
 /// the lens's fall-off (cos⁴ of the light), the cone of the light, which is 0.5 of its middle at
 /// the rim, and the field stop, 1 for r < 1 and 0 beyond it, mixed within one pixel.
 /// \pre three channels
-void look_through_endoscope(Image& image, const Camera& camera);
+void look_through_endoscope(texture::Image& image, const Camera& camera);
 
-} // namespace gewebe
+} // namespace gewebe::shading

@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-namespace gewebe {
+namespace gewebe::shading {
 namespace {
 
 constexpr std::size_t leaf_size = 4;
@@ -116,4 +116,4 @@ double facet_tree_bytes(double facets) {
   return facets * (sizeof(Item) + sizeof(FacetTree::Leaf) / 2.0 + sizeof(FacetTree::Node) / 6.0);
 }
 
-} // namespace gewebe
+} // namespace gewebe::shading

@@ -12,7 +12,7 @@
 #include <span>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::shading {
 
 struct FacetTree {
   /// Children that are there come first.
@@ -52,4 +52,4 @@ inline FirstHit first_hit(CpuLevel level) {
 /// Bytes that the tree of so many facets needs while it is made, without the facets.
 double facet_tree_bytes(double facets);
 
-} // namespace gewebe
+} // namespace gewebe::shading

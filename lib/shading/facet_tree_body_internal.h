@@ -8,7 +8,7 @@
 #include <cstddef>
 #include <immintrin.h>
 
-namespace gewebe {
+namespace gewebe::shading {
 namespace {
 
 using FourBits = long long __attribute__((vector_size(32)));
@@ -29,7 +29,7 @@ struct Ray {
 
 /// Query of boxes.
 struct Slabs {
-  Four from[3], inverse[3];    ///< by axis: four equal numbers, infinite along an axis
+  numeric::Four from[3], inverse[3]; ///< by axis: four equal numbers, infinite along an axis
   std::size_t near[3], far[3]; ///< numbers from the first of the node's to the sides met first
 };
 
@@ -41,12 +41,14 @@ inline const double* numbers_of(const FacetTree::Node& node) {
 /// Where the ray comes into each of the boxes, 0 from inside. \return a bit for each that it meets
 /// nearer than `nearest`, with slack for rounding: a facet may lie in a side of its box
 inline unsigned entries(const FacetTree::Node& node, const Slabs& slabs, double nearest,
-                        Four& enter) {
+                        numeric::Four& enter) {
   const double* const numbers = numbers_of(node);
-  Four e{}, leave = Four{} + HUGE_VAL;
+  numeric::Four e{}, leave = numeric::Four{} + HUGE_VAL;
   for (int a = 0; a < 3; ++a) {
-    const Four low = (four(numbers + slabs.near[a]) - slabs.from[a]) * slabs.inverse[a];
-    const Four high = (four(numbers + slabs.far[a]) - slabs.from[a]) * slabs.inverse[a];
+    const numeric::Four low =
+        (numeric::four(numbers + slabs.near[a]) - slabs.from[a]) * slabs.inverse[a];
+    const numeric::Four high =
+        (numeric::four(numbers + slabs.far[a]) - slabs.from[a]) * slabs.inverse[a];
     e = low > e ? low : e; // not where the ray runs in a side: 0 · ∞
     leave = high < leave ? high : leave;
   }
@@ -55,29 +57,32 @@ inline unsigned entries(const FacetTree::Node& node, const Slabs& slabs, double 
   return bits_of((e <= leave * (1 + 1e-12)) & (e < nearest)) & all;
 }
 
-inline void minus(const Vec3& a, const double (&b)[3][4], Four (&to)[3]) {
+inline void minus(const Vec3& a, const double (&b)[3][4], numeric::Four (&to)[3]) {
   for (int k = 0; k < 3; ++k)
-    to[k] = a[k] - four(b[k]);
+    to[k] = a[k] - numeric::four(b[k]);
 }
 
 /// The nearest of `most` and where the ray meets the facets.
 inline double nearest_of(const FacetTree::Leaf& leaf, const Ray& ray, double most) {
   constexpr double slack = 1e-9; // so that no ray slips through between two facets
   const Vec3& d = ray.along;
-  const Four &e1x = four(leaf.edge1[0]), &e1y = four(leaf.edge1[1]), &e1z = four(leaf.edge1[2]);
-  const Four &e2x = four(leaf.edge2[0]), &e2y = four(leaf.edge2[1]), &e2z = four(leaf.edge2[2]);
-  const Four px = d.y * e2z - d.z * e2y, py = d.z * e2x - d.x * e2z, pz = d.x * e2y - d.y * e2x;
-  const Four det = e1x * px + e1y * py + e1z * pz;
-  Four to[3];
+  const numeric::Four &e1x = numeric::four(leaf.edge1[0]), &e1y = numeric::four(leaf.edge1[1]),
+                      &e1z = numeric::four(leaf.edge1[2]);
+  const numeric::Four &e2x = numeric::four(leaf.edge2[0]), &e2y = numeric::four(leaf.edge2[1]),
+                      &e2z = numeric::four(leaf.edge2[2]);
+  const numeric::Four px = d.y * e2z - d.z * e2y, py = d.z * e2x - d.x * e2z,
+                      pz = d.x * e2y - d.y * e2x;
+  const numeric::Four det = e1x * px + e1y * py + e1z * pz;
+  numeric::Four to[3];
   minus(ray.from, leaf.corner, to);
-  const Four u = (to[0] * px + to[1] * py + to[2] * pz) / det;
+  const numeric::Four u = (to[0] * px + to[1] * py + to[2] * pz) / det;
   const FourBits along1 = (det != 0) & (u >= -slack) & (u <= 1 + slack);
   if (bits_of(along1) == 0)
     return most;
-  const Four qx = to[1] * e1z - to[2] * e1y, qy = to[2] * e1x - to[0] * e1z,
-             qz = to[0] * e1y - to[1] * e1x;
-  const Four v = (d.x * qx + d.y * qy + d.z * qz) / det;
-  const Four t = (e2x * qx + e2y * qy + e2z * qz) / det;
+  const numeric::Four qx = to[1] * e1z - to[2] * e1y, qy = to[2] * e1x - to[0] * e1z,
+                      qz = to[0] * e1y - to[1] * e1x;
+  const numeric::Four v = (d.x * qx + d.y * qy + d.z * qz) / det;
+  const numeric::Four t = (e2x * qx + e2y * qy + e2z * qz) / det;
   const unsigned met =
       bits_of(along1 & (v >= -slack) & (u + v <= 1 + slack) & (t > 0) & (t < most));
   for (unsigned k = 0; k < 4; ++k)
@@ -100,7 +105,7 @@ inline double walk(const FacetTree& tree, const Ray& ray, const Slabs& slabs, do
   std::uint32_t at = 0;
   for (;;) {
     if ((at & FacetTree::leaf_bit) == 0) {
-      Four enter;
+      numeric::Four enter;
       unsigned met = entries(nodes[at], slabs, nearest, enter);
       Later* const first = end;
       for (; met != 0; met &= met - 1) { // the nearest last
@@ -130,8 +135,8 @@ inline double first_hit_of(const FacetTree& tree, const Vec3& from, const Vec3& 
   const Vec3 inverse{1 / along.x, 1 / along.y, 1 / along.z};
   Slabs slabs;
   for (int a = 0; a < 3; ++a) {
-    slabs.from[a] = Four{} + from[a];
-    slabs.inverse[a] = Four{} + inverse[a];
+    slabs.from[a] = numeric::Four{} + from[a];
+    slabs.inverse[a] = numeric::Four{} + inverse[a];
     const std::size_t low = 4 * static_cast<std::size_t>(a), high = low + 12;
     slabs.near[a] = inverse[a] < 0 ? high : low;
     slabs.far[a] = inverse[a] < 0 ? low : high;
@@ -140,4 +145,4 @@ inline double first_hit_of(const FacetTree& tree, const Vec3& from, const Vec3& 
 }
 
 } // namespace
-} // namespace gewebe
+} // namespace gewebe::shading

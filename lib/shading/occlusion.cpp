@@ -10,7 +10,7 @@
 #include <cstdint>
 #include <utility>
 
-namespace gewebe {
+namespace gewebe::shading {
 namespace {
 
 /// Around +z, distributed as the cosine.
@@ -82,4 +82,4 @@ double occlusion_bytes(double triangles) {
   return triangles * sizeof(FacetCorners) + facet_tree_bytes(triangles);
 }
 
-} // namespace gewebe
+} // namespace gewebe::shading

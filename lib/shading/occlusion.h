@@ -9,7 +9,7 @@
 #include <span>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::shading {
 
 /// A surface that occludes others and itself. There is one normal per point, of unit length or 0.
 struct Occluder {
@@ -41,4 +41,4 @@ std::vector<std::vector<float>> openness(std::span<const Occluder> surfaces, dou
 /// Memory of openness() for a number of triangles, bytes.
 double occlusion_bytes(double triangles);
 
-} // namespace gewebe
+} // namespace gewebe::shading

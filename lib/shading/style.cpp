@@ -11,7 +11,7 @@
 #include <iterator>
 #include <utility>
 
-namespace gewebe {
+namespace gewebe::shading {
 
 Surface faceted(const Surface& surface) {
   Surface out;
@@ -181,4 +181,4 @@ Surface wireframe(const Surface& surface, const Camera& camera, double pixels,
   return out;
 }
 
-} // namespace gewebe
+} // namespace gewebe::shading

@@ -7,7 +7,7 @@
 
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::shading {
 
 /// The surface with three separate points for each triangle and without normals, so that each point
 /// has its face's normal.
@@ -29,4 +29,4 @@ std::vector<Surface> two_sided(std::vector<Surface> surfaces, const Vec3& eye);
 Surface wireframe(const Surface& surface, const Camera& camera, double pixels,
                   std::uint32_t height);
 
-} // namespace gewebe
+} // namespace gewebe::shading

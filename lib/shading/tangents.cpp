@@ -11,7 +11,7 @@
 // Based on: Lengyel, Mathematics for 3D Game Programming and Computer Graphics, 2nd edition, 2003
 // (tangent vectors from texture coordinates).
 
-namespace gewebe {
+namespace gewebe::shading {
 namespace {
 
 constexpr std::size_t grain = 4096;
@@ -182,4 +182,4 @@ void renew_frames(TexturedVertices& vertices, const TriangleMesh& mesh,
   });
 }
 
-} // namespace gewebe
+} // namespace gewebe::shading

@@ -12,7 +12,7 @@
 #include <span>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::shading {
 
 /// Per point, the sum of the normals of its triangles weighted by area, of unit length; 0 where
 /// there is none. \pre the triangles' corners index `points`
@@ -49,4 +49,4 @@ void renew_frames(TexturedVertices& vertices, const TriangleMesh& mesh,
                   std::span<const std::array<float, 6>> texcoords, const std::vector<Vec3>& normals,
                   const Context& context);
 
-} // namespace gewebe
+} // namespace gewebe::shading

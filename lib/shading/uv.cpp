@@ -9,7 +9,7 @@
 #include <algorithm>
 #include <cmath>
 
-namespace gewebe {
+namespace gewebe::shading {
 namespace {
 
 using Corners = std::array<std::array<double, 2>, 3>; // s and t of each
@@ -152,7 +152,7 @@ std::uint64_t add_texcoords(std::vector<Surface>& surfaces, const UvOptions& opt
   UvFrame frame;
   frame.mapping = options.mapping.value_or(UvMapping::box);
   frame.box = rest_box(surfaces);
-  frame.edge = rest_mapping(frame.box, options.edge).edge;
+  frame.edge = texture::rest_mapping(frame.box, options.edge).edge;
   std::uint64_t mapped = 0;
   for (Surface& surface : surfaces) {
     if (surface.instrument) { // which has no use for them, but a place
@@ -168,4 +168,4 @@ std::uint64_t add_texcoords(std::vector<Surface>& surfaces, const UvOptions& opt
   return mapped;
 }
 
-} // namespace gewebe
+} // namespace gewebe::shading

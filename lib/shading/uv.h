@@ -14,7 +14,7 @@
 #include <string_view>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::shading {
 
 enum class UvMapping { box, sphere, cylinder };
 
@@ -53,4 +53,4 @@ struct UvOptions {
 std::uint64_t add_texcoords(std::vector<Surface>& surfaces, const UvOptions& options,
                             const Context& context);
 
-} // namespace gewebe
+} // namespace gewebe::shading

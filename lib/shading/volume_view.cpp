@@ -11,11 +11,11 @@
 #include <functional>
 #include <string>
 
-namespace gewebe {
+namespace gewebe::shading {
 namespace {
 
 /// The linear part of world → index.
-std::array<Vec3, 3> inverse_of(const GridTransform& transform) {
+std::array<Vec3, 3> inverse_of(const volume::GridTransform& transform) {
   const auto& m = transform.m;
   const Vec3 x{m[0], m[4], m[8]}, y{m[1], m[5], m[9]}, z{m[2], m[6], m[10]};
   const double volume = transform.determinant();
@@ -24,7 +24,7 @@ std::array<Vec3, 3> inverse_of(const GridTransform& transform) {
   return {cross(y, z) / volume, cross(z, x) / volume, cross(x, y) / volume};
 }
 
-Box3 world_box(const Grid& grid) {
+Box3 world_box(const volume::Grid& grid) {
   Int3 min{}, max{};
   Box3 box;
   if (grid.active_box(min, max))
@@ -41,9 +41,9 @@ Box3 world_box(const Grid& grid) {
 /// centre and those of the next ones.
 class Bounds {
 public:
-  Bounds(const Grid& grid, const Context& context) {
-    const std::vector<LeafView> leaves = grid.leaves();
-    const std::vector<TileView> tiles = grid.tiles();
+  Bounds(const volume::Grid& grid, const Context& context) {
+    const std::vector<volume::LeafView> leaves = grid.leaves();
+    const std::vector<volume::TileView> tiles = grid.tiles();
     const float background = grid.info().background;
     Int3 low{INT32_MAX, INT32_MAX, INT32_MAX}, high{INT32_MIN, INT32_MIN, INT32_MIN};
     const auto enclose = [&](const Int3& origin, std::int32_t dim) {
@@ -52,9 +52,9 @@ public:
         high[a] = std::max(high[a], (origin[a] + dim - 1) >> 3);
       }
     };
-    for (const LeafView& leaf : leaves)
-      enclose(leaf.origin, leaf_dim);
-    for (const TileView& tile : tiles)
+    for (const volume::LeafView& leaf : leaves)
+      enclose(leaf.origin, volume::leaf_dim);
+    for (const volume::TileView& tile : tiles)
       enclose(tile.origin, tile.dim);
     if (leaves.empty() && tiles.empty())
       return;
@@ -66,10 +66,10 @@ public:
     require_memory(context, 2 * count * sizeof(float), "the bounds of the volume's blocks");
     std::vector<float> own(static_cast<std::size_t>(count), background);
     bound_ = own;
-    for (const LeafView& leaf : leaves)
+    for (const volume::LeafView& leaf : leaves)
       own[slot({leaf.origin[0] >> 3, leaf.origin[1] >> 3, leaf.origin[2] >> 3})] =
-          *std::max_element(leaf.values, leaf.values + leaf_voxels);
-    for (const TileView& tile : tiles)
+          *std::max_element(leaf.values, leaf.values + volume::leaf_voxels);
+    for (const volume::TileView& tile : tiles)
       for_blocks(tile, [&](const Int3& block) { own[slot(block)] = tile.value; });
     spread(own);
   }
@@ -88,7 +88,7 @@ private:
     return (part(0) * size(1) + part(1)) * size(2) + part(2);
   }
   template <class Visit>
-  static void for_blocks(const TileView& tile, const Visit& visit) {
+  static void for_blocks(const volume::TileView& tile, const Visit& visit) {
     const std::int32_t n = tile.dim >> 3;
     for (std::int32_t i = 0; i < n; ++i)
       for (std::int32_t j = 0; j < n; ++j)
@@ -234,7 +234,7 @@ double faded(double x) {
 
 class Projector {
 public:
-  Projector(const Grid& grid, const Bounds& bounds)
+  Projector(const volume::Grid& grid, const Bounds& bounds)
       : values_(grid), bounds_(bounds), background_(static_cast<double>(grid.info().background)) {
     for (int a = 0; a < 3; ++a) {
       min_[a] = 8.0 * bounds.min()[static_cast<std::size_t>(a)];
@@ -248,7 +248,7 @@ public:
       return static_cast<float>(best);
     // The most promising block first, so that most of the others need no look.
     parts_.clear();
-    walk(ray, leaf_dim, bounds_.min(), bounds_.max(), t0, t1,
+    walk(ray, volume::leaf_dim, bounds_.min(), bounds_.max(), t0, t1,
          [&](const Int3& block, double from, double to) {
            const auto bound = static_cast<double>(bounds_.at(block));
            if (bound > best)
@@ -281,7 +281,7 @@ public:
     double left = 1, t0 = 0, t1 = 0;
     std::array<double, 3> sum{};
     if (!bounds_.empty() && clip(ray, min_, max_, t0, t1))
-      walk(ray, leaf_dim, bounds_.min(), bounds_.max(), t0, t1,
+      walk(ray, volume::leaf_dim, bounds_.min(), bounds_.max(), t0, t1,
            [&](const Int3& block, double from, double to) {
              if (left < least || static_cast<double>(bounds_.at(block)) <= low)
                return;
@@ -300,7 +300,7 @@ public:
                  const double value = cell_.value(ray.at(enter + (n + 0.5) * step));
                  const double u = std::clamp((value - low) / (high - low), 0.0, 1.0);
                  const double through = faded(extinction * u * step);
-                 const std::array<double, 3> c = ramp_color(transfer.ramp, u);
+                 const std::array<double, 3> c = texture::ramp_color(transfer.ramp, u);
                  for (std::size_t k = 0; k < 3; ++k)
                    sum[k] += left * (1 - through) * (c[k] / 255);
                  left *= through;
@@ -321,7 +321,7 @@ private:
   /// `leaf` holds the values of the block around, if it is there.
   void take(const Int3& at, const float* leaf) {
     cell_.at = at;
-    const int corner = leaf_offset(at);
+    const int corner = volume::leaf_offset(at);
     const bool within = (at[0] & 7) < 7 && (at[1] & 7) < 7 && (at[2] & 7) < 7;
     for (std::int32_t n = 0; n < 8; ++n)
       cell_.corner[static_cast<std::size_t>(n)] = static_cast<double>(
@@ -330,7 +330,7 @@ private:
               : values_.value({at[0] + (n & 1), at[1] + (n >> 1 & 1), at[2] + (n >> 2)}));
   }
 
-  GridAccessor values_;
+  volume::GridAccessor values_;
   const Bounds& bounds_;
   double background_;
   Vec3 min_, max_;
@@ -370,8 +370,9 @@ void set_extent(VolumeView& view, const VolumeViewOptions& options, const Box3& 
 
 } // namespace
 
-VolumeView view_volume(const Grid& grid, const VolumeViewOptions& options, const Context& context) {
-  const GridTransform& transform = grid.info().transform;
+VolumeView view_volume(const volume::Grid& grid, const VolumeViewOptions& options,
+                       const Context& context) {
+  const volume::GridTransform& transform = grid.info().transform;
   const std::array<Vec3, 3> inverse = inverse_of(transform);
   const Box3 box = world_box(grid);
   VolumeView view;
@@ -379,7 +380,7 @@ VolumeView view_volume(const Grid& grid, const VolumeViewOptions& options, const
   view.height = options.height;
   view.camera = camera_of(options, box);
   set_extent(view, options, box);
-  const ValueSummary& values = grid.summary(context);
+  const volume::ValueSummary& values = grid.summary(context);
   view.min = static_cast<double>(std::min(values.min, grid.info().background));
   view.max = static_cast<double>(std::max(values.max, grid.info().background));
   const bool translucent = options.mode == VolumeMode::translucent;
@@ -412,9 +413,9 @@ VolumeView view_volume(const Grid& grid, const VolumeViewOptions& options, const
     return !(std::max({std::fabs(p.x), std::fabs(p.y), std::fabs(p.z)}) < (1 << 30));
   };
   const Bounds bounds =
-      options.mode == VolumeMode::slice ? Bounds(Grid(), context) : Bounds(grid, context);
+      options.mode == VolumeMode::slice ? Bounds(volume::Grid(), context) : Bounds(grid, context);
   parallel_blocks(context, view.height, 4, [&](std::size_t begin, std::size_t end) {
-    Field field(grid);
+    volume::Field field(grid);
     Projector projector(grid, bounds);
     for (std::size_t y = begin; y < end; ++y)
       for (std::size_t x = 0; x < view.width; ++x) {
@@ -435,4 +436,4 @@ VolumeView view_volume(const Grid& grid, const VolumeViewOptions& options, const
   return view;
 }
 
-} // namespace gewebe
+} // namespace gewebe::shading

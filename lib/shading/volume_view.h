@@ -13,7 +13,7 @@
 #include <optional>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::shading {
 
 enum class VolumeMode { slice, maximum, translucent };
 
@@ -24,7 +24,7 @@ enum class VolumeAxis { x, y, z, view };
 /// What a translucent volume of value v shines with and hides: for u = clamp((v - range[0]) /
 /// (range[1] - range[0]), 0, 1) colour c(u) of the ramp, and the extinction σ = extinction · u.
 struct TransferFunction {
-  ColorRamp ramp;                             ///< one colour at least
+  texture::ColorRamp ramp;                    ///< one colour at least
   std::optional<std::array<double, 2>> range; ///< increasing; nothing: least and greatest value
   std::optional<double> extinction;           ///< 1/mm; nothing: 8 / longest side of the box
 };
@@ -62,6 +62,7 @@ struct VolumeView {
 /// active voxels with a margin of 5 %; where the camera's options place the eye or its distance, as
 /// much as the camera sees at the target. \throw Error if the transform is singular, the camera has
 /// no place, or memory would not do; Cancelled
-VolumeView view_volume(const Grid& grid, const VolumeViewOptions& options, const Context& context);
+VolumeView view_volume(const volume::Grid& grid, const VolumeViewOptions& options,
+                       const Context& context);
 
-} // namespace gewebe
+} // namespace gewebe::shading

@@ -22,7 +22,7 @@
 #include <optional>
 #include <utility>
 
-namespace gewebe {
+namespace gewebe::statics {
 
 struct Elastostatic::Past {
   /// The last load, its reactions, and its shape once it was read.
@@ -30,8 +30,8 @@ struct Elastostatic::Past {
     bool by_block = false; // how the load is met
     std::uint64_t id = 0;  // of the compliance with these nodes held
     CopyOnWrite<std::vector<std::uint32_t>> id_of{};
-    CopyOnWrite<Load> load{};
-    CopyOnWrite<std::vector<NodeVector>> forces{};
+    CopyOnWrite<contact::Load> load{};
+    CopyOnWrite<std::vector<contact::NodeVector>> forces{};
     CopyOnWrite<std::vector<double>> u{};     // of the rows that sums have
     CopyOnWrite<std::vector<double>> whole{}; // over all axes, where these are more
     CopyOnWrite<std::vector<double>> rough{}; // as u, within the tolerance
@@ -39,27 +39,27 @@ struct Elastostatic::Past {
     bool measured = true; // a shape under this load
   };
 
-  Compliance::Past compliance;
-  LoadAnswer::Past answer;
-  ForcesAt::Past block;
+  compliance::Compliance::Past compliance;
+  compliance::LoadAnswer::Past answer;
+  compliance::ForcesAt::Past block;
   HeldContacts::Past held;
   Last last;
 };
 
 struct Elastostatic::State {
-  const Model& model;
+  const model::Model& model;
   Context context;
   ElastostaticOptions options;
-  Compliance compliance;
+  compliance::Compliance compliance;
   ElastostaticCounts counts;
   std::optional<double> norm; // of K, for backward errors
-  std::optional<StiffnessOperator> stiffness;
-  LoadAnswer answer; // beside displacements
-  ForcesAt block;
+  std::optional<fem::StiffnessOperator> stiffness;
+  compliance::LoadAnswer answer; // beside displacements
+  compliance::ForcesAt block;
   HeldContacts held;
   Past::Last last;
 
-  State(const Model& m, std::shared_ptr<ComplianceSource> s, const Context& c,
+  State(const model::Model& m, std::shared_ptr<compliance::ComplianceSource> s, const Context& c,
         const ElastostaticOptions& o)
       : model(m), context(without_progress(c)), options(o),
         compliance(m, std::move(s), c, o.tolerance > 0, o.may_be_free), answer(m, compliance),
@@ -84,7 +84,7 @@ struct Elastostatic::State {
         size = std::max(size, std::abs(entry.second[a]));
     if (size > 0 || last.load->force.empty())
       return size;
-    if (!compliance.columns_pay(nodes_of(last.load->force)))
+    if (!compliance.columns_pay(compliance::nodes_of(last.load->force)))
       return 0;
     std::vector<std::size_t> where;
     for (const auto& entry : last.load->force)
@@ -99,7 +99,7 @@ struct Elastostatic::State {
     if (last.load->displacement.empty()) {
       // Where sums may leave something out, they are made for this load alone.
       if (tolerance > 0 && !answer.known(*last.load) &&
-          compliance.columns_pay(nodes_of(last.load->force))) {
+          compliance.columns_pay(compliance::nodes_of(last.load->force))) {
         add_outer(tolerance, shape);
         answer.note(*last.load);
         return false;
@@ -109,7 +109,7 @@ struct Elastostatic::State {
     }
     bool exact = true;
     if (!block.shape(*last.load, shape)) {
-      const std::vector<std::uint32_t> nodes = nodes_of(last.load->displacement);
+      const std::vector<std::uint32_t> nodes = compliance::nodes_of(last.load->displacement);
       const bool columns = !last.by_block || compliance.columns_for_shape(nodes, block.shapes());
       if (columns && (answer.known(*last.load) || compliance.columns_pay(nodes))) {
         shape = answer.whole(*last.load);
@@ -128,7 +128,7 @@ struct Elastostatic::State {
     const double allowed = tolerance > 0 ? tolerance * min_size() : 0;
     shape = answer.weight(last.load->gravity);
     shape.resize(compliance.rows(), 0);
-    compliance.add(as_vectors(last.load->force), allowed, shape);
+    compliance.add(compliance::as_vectors(last.load->force), allowed, shape);
   }
 
   void solve_all(std::vector<double>& shape) {
@@ -147,8 +147,8 @@ struct Elastostatic::State {
 
   /// The load with what holds its displaced nodes.
   std::vector<double> all_forces() const {
-    std::vector<double> f = forces_over_axes(model, *last.load);
-    for (const NodeVector& contact : *last.forces)
+    std::vector<double> f = compliance::forces_over_axes(model, *last.load);
+    for (const contact::NodeVector& contact : *last.forces)
       for (int a = 0; a < 3; ++a)
         f[axis_of(contact.node, a)] += contact.value[a];
     return f;
@@ -225,8 +225,8 @@ struct Elastostatic::State {
   /// The shape in another place: nothing that other answers come from changes.
   std::vector<double> make_aside(double tolerance) {
     std::vector<double> shape;
-    if (compliance.at_hand(nodes_of(last.load->force)) &&
-        compliance.at_hand(nodes_of(last.load->displacement))) {
+    if (compliance.at_hand(compliance::nodes_of(last.load->force)) &&
+        compliance.at_hand(compliance::nodes_of(last.load->displacement))) {
       add_outer(last.load->displacement.empty() ? tolerance : 0, shape);
       if (!last.load->displacement.empty())
         compliance.add(*last.forces, tolerance > 0 ? tolerance * min_size() : 0, shape);
@@ -263,7 +263,7 @@ struct Elastostatic::State {
       error.error = distance(shape, need_whole());
     const std::vector<double>& over_axes = all_rows() ? shape : *last.whole;
     if (!norm) {
-      norm = stiffness_norm(stiffness_matrix(model));
+      norm = linalg::stiffness_norm(fem::stiffness_matrix(model));
       stiffness.emplace(model);
     }
     std::vector<double> product(over_axes.size(), 0);
@@ -272,7 +272,7 @@ struct Elastostatic::State {
     double residual = 0, load_size = 0;
     for (std::uint32_t i = 0; i < model.nodes.size(); ++i)
       for (int a = 0; a < 3; ++a)
-        if (!is_fixed(model, i, a)) {
+        if (!contact::is_fixed(model, i, a)) {
           residual = std::max(residual, std::abs(product[axis_of(i, a)] - f[axis_of(i, a)]));
           load_size = std::max(load_size, std::abs(f[axis_of(i, a)]));
         }
@@ -280,8 +280,8 @@ struct Elastostatic::State {
     if (scale > 0)
       error.error = std::max(error.error, residual / scale);
     if (size > 0) {
-      const EntryBound given = compliance.bound(as_vectors(last.load->force)),
-                       found = compliance.bound(*last.forces);
+      const columns::EntryBound given = compliance.bound(compliance::as_vectors(last.load->force)),
+                                found = compliance.bound(*last.forces);
       error.limit += (given.entry + found.entry) / size;
       error.relative = given.relative;
     }
@@ -290,7 +290,7 @@ struct Elastostatic::State {
       counts.worst_shape = error;
   }
 
-  void update(const Load& now) {
+  void update(const contact::Load& now) {
     ++counts.updates;
     if (now == *last.load) {
       ++counts.unchanged;
@@ -304,7 +304,7 @@ struct Elastostatic::State {
       else if (compliance.is_free())
         stand_still(now);
       double sum = 0;
-      for (const NodeVector& f : *last.forces)
+      for (const contact::NodeVector& f : *last.forces)
         sum += std::abs(f.value.x) + std::abs(f.value.y) + std::abs(f.value.z);
       if (!std::isfinite(sum))
         throw Error("the contact forces are not finite, expected a smaller load");
@@ -322,7 +322,7 @@ struct Elastostatic::State {
   }
 
   /// Free, and nothing acts on it.
-  void stand_still(const Load& now) {
+  void stand_still(const contact::Load& now) {
     if (!now.empty())
       compliance.require_held();
     last.u.replace().assign(compliance.rows(), 0);
@@ -330,7 +330,7 @@ struct Elastostatic::State {
     last.shape_known = last.whole_known = true;
   }
 
-  void meet(const Load& now) {
+  void meet(const contact::Load& now) {
     if (!compliance.is_free() && block.cheaper(now, options.block_limit) && block.meet(now)) {
       last.forces = block.forces();
       last.by_block = true;
@@ -349,8 +349,8 @@ struct Elastostatic::State {
 
   // ---- contact
 
-  std::uint64_t compliance_id(const Load& now) {
-    std::vector<std::uint32_t> nodes = nodes_of(now.displacement);
+  std::uint64_t compliance_id(const contact::Load& now) {
+    std::vector<std::uint32_t> nodes = compliance::nodes_of(now.displacement);
     if (last.id == 0 || nodes != *last.id_of) {
       last.id = unique_number();
       last.id_of = std::move(nodes);
@@ -359,7 +359,7 @@ struct Elastostatic::State {
   }
 
   /// Columns of these nodes and of displaced ones.
-  void need_columns(const Load& now, std::span<const std::uint32_t> nodes) {
+  void need_columns(const contact::Load& now, std::span<const std::uint32_t> nodes) {
     std::vector<std::uint32_t> all(nodes.begin(), nodes.end());
     for (const auto& entry : now.displacement)
       all.push_back(entry.first);
@@ -369,7 +369,8 @@ struct Elastostatic::State {
     compliance.need(all);
   }
 
-  void compliance_blocks(const Load& now, std::uint32_t node, std::span<const std::uint32_t> rows,
+  void compliance_blocks(const contact::Load& now, std::uint32_t node,
+                         std::span<const std::uint32_t> rows,
                          std::span<std::array<double, 9>> blocks) {
     if (!now.displacement.empty())
       update(now);
@@ -377,13 +378,13 @@ struct Elastostatic::State {
       compliance.require_held();
     if (now.displacement.empty() || last.by_block)
       need_columns(now, std::span(&node, 1));
-    const auto put = [](const ComplianceBlock& from, std::array<double, 9>& to) {
+    const auto put = [](const compliance::ComplianceBlock& from, std::array<double, 9>& to) {
       for (std::size_t i = 0; i < 3; ++i)
         for (std::size_t j = 0; j < 3; ++j)
           to[3 * i + j] = from[j][i];
     };
     if (!now.displacement.empty() && !last.by_block) {
-      const ColumnCache& columns = held.columns(std::span(&node, 1));
+      const columns::ColumnCache& columns = held.columns(std::span(&node, 1));
       for (std::size_t k = 0; k < rows.size(); ++k)
         for (std::size_t i = 0; i < 3; ++i)
           for (std::size_t j = 0; j < 3; ++j)
@@ -413,7 +414,8 @@ struct Elastostatic::State {
     }
   }
 
-  DelassusOperator delassus_operator(const Load& now, std::span<const std::uint32_t> nodes) {
+  DelassusOperator delassus_operator(const contact::Load& now,
+                                     std::span<const std::uint32_t> nodes) {
     update(now);
     const bool held_by_factor = !now.displacement.empty() && !last.by_block;
     if (!held_by_factor)
@@ -452,7 +454,8 @@ struct Elastostatic::State {
   }
 };
 
-Elastostatic::Elastostatic(const Model& model, std::shared_ptr<ComplianceSource> source,
+Elastostatic::Elastostatic(const model::Model& model,
+                           std::shared_ptr<compliance::ComplianceSource> source,
                            const Context& context, const ElastostaticOptions& options)
     : state_(std::make_unique<State>(model, std::move(source), context, options)) {}
 Elastostatic::~Elastostatic() = default;
@@ -473,7 +476,7 @@ void Elastostatic::restore(const Past& past) {
   s.last = past.last;
 }
 
-void Elastostatic::update(const Load& load) {
+void Elastostatic::update(const contact::Load& load) {
   state_->update(load);
 }
 
@@ -494,53 +497,54 @@ void Elastostatic::verify() {
   state_->verify();
 }
 
-const std::vector<NodeVector>& Elastostatic::contact_forces() const noexcept {
+const std::vector<contact::NodeVector>& Elastostatic::contact_forces() const noexcept {
   return *state_->last.forces;
 }
 
-void Elastostatic::compliance_blocks(const Load& load, std::uint32_t node,
+void Elastostatic::compliance_blocks(const contact::Load& load, std::uint32_t node,
                                      std::span<const std::uint32_t> rows,
                                      std::span<std::array<double, 9>> blocks) {
   state_->compliance_blocks(load, node, rows, blocks);
 }
 
-std::uint64_t Elastostatic::compliance_id(const Load& load) {
+std::uint64_t Elastostatic::compliance_id(const contact::Load& load) {
   return state_->compliance_id(load);
 }
 
-DelassusOperator Elastostatic::delassus_operator(const Load& load,
+DelassusOperator Elastostatic::delassus_operator(const contact::Load& load,
                                                  std::span<const std::uint32_t> nodes) {
   return state_->delassus_operator(load, nodes);
 }
 
-const NodeClusters* Elastostatic::clusters() const noexcept {
+const columns::NodeClusters* Elastostatic::clusters() const noexcept {
   if (state_->compliance.is_free())
     return nullptr;
-  const CompressedColumns* const columns = state_->compliance.compressed_rows();
+  const columns::CompressedColumns* const columns = state_->compliance.compressed_rows();
   return columns != nullptr ? &columns->layout().clusters : nullptr;
 }
 
 namespace {
 
 /// What moves something: nodes without columns are fixed.
-std::vector<NodeVector> with_columns(const CompressedColumns& columns,
-                                     std::span<const NodeVector> forces) {
-  std::vector<NodeVector> some;
+std::vector<contact::NodeVector> with_columns(const columns::CompressedColumns& columns,
+                                              std::span<const contact::NodeVector> forces) {
+  std::vector<contact::NodeVector> some;
   std::ranges::copy_if(forces, std::back_inserter(some),
-                       [&](const NodeVector& f) { return columns.has(f.node); });
+                       [&](const contact::NodeVector& f) { return columns.has(f.node); });
   return some;
 }
 
 } // namespace
 
-std::vector<double> Elastostatic::displacement_of_clusters(std::span<const std::uint32_t> clusters,
-                                                           std::span<const NodeVector> forces) {
-  const CompressedColumns& columns = *state_->compliance.compressed_rows();
+std::vector<double>
+Elastostatic::displacement_of_clusters(std::span<const std::uint32_t> clusters,
+                                       std::span<const contact::NodeVector> forces) {
+  const columns::CompressedColumns& columns = *state_->compliance.compressed_rows();
   return columns.sum_at(clusters, with_columns(columns, forces), state_->context);
 }
 
-std::vector<double> Elastostatic::displacement_bounds(std::span<const NodeVector> forces) {
-  const CompressedColumns& columns = *state_->compliance.compressed_rows();
+std::vector<double> Elastostatic::displacement_bounds(std::span<const contact::NodeVector> forces) {
+  const columns::CompressedColumns& columns = *state_->compliance.compressed_rows();
   std::vector<double> bounds = columns.bounds(with_columns(columns, forces), state_->context);
   for (double& bound : bounds)
     bound *= std::numbers::sqrt3;
@@ -571,4 +575,4 @@ ElastostaticCounts Elastostatic::counts() const noexcept {
   return counts;
 }
 
-} // namespace gewebe
+} // namespace gewebe::statics

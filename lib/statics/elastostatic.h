@@ -28,10 +28,15 @@
 #include <span>
 #include <vector>
 
-namespace gewebe {
-
-class ComplianceSource;
+namespace gewebe::columns {
 struct NodeClusters;
+} // namespace gewebe::columns
+
+namespace gewebe::compliance {
+class ComplianceSource;
+} // namespace gewebe::compliance
+
+namespace gewebe::statics {
 
 /// Displacements of some nodes under forces on them: u = free + compliance f.
 struct DelassusOperator {
@@ -95,8 +100,8 @@ public:
   /// \param source  of its compliance; null: K is factorised
   /// \pre check_model(model) passes; the source belongs to the model
   /// \throw Error as the factor: K singular (except with `may_be_free`), memory
-  Elastostatic(const Model& model, std::shared_ptr<ComplianceSource> source, const Context& context,
-               const ElastostaticOptions& options = {});
+  Elastostatic(const model::Model& model, std::shared_ptr<compliance::ComplianceSource> source,
+               const Context& context, const ElastostaticOptions& options = {});
   ~Elastostatic();
   Elastostatic(Elastostatic&&) noexcept;
 
@@ -113,7 +118,7 @@ public:
   /// \throw Error if columns can't be read, memory does not suffice, forces are not finite, or
   /// displacements are not met within 1e-6 of the largest
   /// \throw SingularStiffness if nothing holds the model
-  void update(const Load& load);
+  void update(const contact::Load& load);
 
   /// Displacement of all nodes: 3 n numbers, mm. Displaced nodes have exactly their prescribed
   /// displacements. It is computed by the first call after an update.
@@ -129,32 +134,34 @@ public:
   void verify();
 
   /// Reactions of the displaced nodes, as Elastodynamic::contact_forces.
-  const std::vector<NodeVector>& contact_forces() const noexcept;
+  const std::vector<contact::NodeVector>& contact_forces() const noexcept;
 
   /// Compliance between `node` and each of `rows`, with the nodes held that `load` displaces: the
   /// displacement of a row under a force on the node, row-major.
   /// \pre as update; none of these nodes is displaced by the load
   /// \throw Error as update, and if memory does not hold the node's columns
-  void compliance_blocks(const Load& load, std::uint32_t node, std::span<const std::uint32_t> rows,
+  void compliance_blocks(const contact::Load& load, std::uint32_t node,
+                         std::span<const std::uint32_t> rows,
                          std::span<std::array<double, 9>> blocks);
 
   /// Number of the matrix that compliance_blocks uses for this load, see base/unique_number.h.
-  std::uint64_t compliance_id(const Load& load);
+  std::uint64_t compliance_id(const contact::Load& load);
   /// Delassus operator of some nodes under a load.
   /// \pre as update; the load displaces nothing; nodes ascending
   /// \throw as compliance_blocks
-  DelassusOperator delassus_operator(const Load& load, std::span<const std::uint32_t> nodes);
+  DelassusOperator delassus_operator(const contact::Load& load,
+                                     std::span<const std::uint32_t> nodes);
 
   /// Clusters of neighbours among the first m nodes, see surface_displacement, where parts of a
   /// shape can be computed alone; else null. It does not change.
-  const NodeClusters* clusters() const noexcept;
+  const columns::NodeClusters* clusters() const noexcept;
   /// Displacement of the nodes of some clusters under forces, cluster by cluster: 3 numbers for
   /// each node. It neither uses nor changes the last load. \pre clusters(); forces at the first m
   /// nodes, ascending   \throw Error if columns can't be read
   std::vector<double> displacement_of_clusters(std::span<const std::uint32_t> clusters,
-                                               std::span<const NodeVector> forces);
+                                               std::span<const contact::NodeVector> forces);
   /// Bound of the length of these displacements, by cluster, mm. \pre as displacement_of_clusters
-  std::vector<double> displacement_bounds(std::span<const NodeVector> forces);
+  std::vector<double> displacement_bounds(std::span<const contact::NodeVector> forces);
 
   /// Solves in advance for the columns of these nodes, unless they are stored, so that later
   /// contacts there need no solve. Updates, shapes and forces are the same to the bit with and
@@ -175,4 +182,4 @@ private:
   std::unique_ptr<State> state_;
 };
 
-} // namespace gewebe
+} // namespace gewebe::statics

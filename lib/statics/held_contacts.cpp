@@ -8,7 +8,7 @@
 #include <cmath>
 #include <utility>
 
-namespace gewebe {
+namespace gewebe::statics {
 
 namespace {
 
@@ -20,7 +20,7 @@ bool same_nodes(const Map& a, const Map& b) {
 
 } // namespace
 
-void HeldContacts::refactor(const Load& now) {
+void HeldContacts::refactor(const contact::Load& now) {
   if (now_.held && same_nodes(now.displacement, now_.held->nodes))
     return;
   if (!stiffness_)
@@ -33,16 +33,16 @@ void HeldContacts::refactor(const Load& now) {
   bool any_free = false;
   for (std::uint32_t i = 0; i < model_.nodes.size() && !any_free; ++i)
     for (int a = 0; a < 3; ++a)
-      any_free = any_free || (fixed[axis_of(i, a)] == 0 && !is_fixed(model_, i, a));
+      any_free = any_free || (fixed[axis_of(i, a)] == 0 && !contact::is_fixed(model_, i, a));
   if (any_free) {
     ++factors_;
     if (free_) {
-      Model held = model_;
+      model::Model held = model_;
       for (const auto& entry : now.displacement)
-        held.nodes[entry.first].fixed = fixed_all;
-      made->solver.emplace(factorise_axes(held, context_));
+        held.nodes[entry.first].fixed = model::fixed_all;
+      made->solver.emplace(compliance::factorise_axes(held, context_));
     } else {
-      made->solver.emplace(factorise_axes(model_, fixed, context_));
+      made->solver.emplace(compliance::factorise_axes(model_, fixed, context_));
     }
   }
   made->nodes = now.displacement;
@@ -71,10 +71,11 @@ void HeldContacts::shape_under(std::span<const double> f, std::span<const double
     shape[r] += prescribed[r]; // on held axes the solution is 0
 }
 
-std::vector<NodeVector> HeldContacts::meet(const Load& now, std::vector<double>& u) {
+std::vector<contact::NodeVector> HeldContacts::meet(const contact::Load& now,
+                                                    std::vector<double>& u) {
   refactor(now);
   Held& held = *now_.held;
-  const std::vector<double> f = forces_over_axes(model_, now);
+  const std::vector<double> f = compliance::forces_over_axes(model_, now);
   std::vector<double> wanted(3 * now.displacement.size()), prescribed(axes_, 0);
   std::size_t k = 0;
   for (const auto& [node, d] : now.displacement)
@@ -126,11 +127,11 @@ std::vector<NodeVector> HeldContacts::meet(const Load& now, std::vector<double>&
       shape[axis_of(node, a)] = d[a];
   std::vector<double> product(axes_, 0);
   stiffness_->multiply(shape, product);
-  std::vector<NodeVector> forces;
+  std::vector<contact::NodeVector> forces;
   for (const auto& entry : now.displacement) {
     Vec3 force;
     for (int a = 0; a < 3; ++a)
-      if (!is_fixed(model_, entry.first, a))
+      if (!contact::is_fixed(model_, entry.first, a))
         force[a] = product[axis_of(entry.first, a)] - f[axis_of(entry.first, a)];
     forces.push_back({entry.first, force});
   }
@@ -138,7 +139,7 @@ std::vector<NodeVector> HeldContacts::meet(const Load& now, std::vector<double>&
   return forces;
 }
 
-const ColumnCache& HeldContacts::columns(std::span<const std::uint32_t> nodes) {
+const columns::ColumnCache& HeldContacts::columns(std::span<const std::uint32_t> nodes) {
   Held& held = *now_.held;
   if (!held.columns)
     held.columns.emplace(
@@ -155,4 +156,4 @@ const ColumnCache& HeldContacts::columns(std::span<const std::uint32_t> nodes) {
   return *held.columns;
 }
 
-} // namespace gewebe
+} // namespace gewebe::statics

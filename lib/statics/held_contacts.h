@@ -19,7 +19,7 @@
 #include <span>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::statics {
 
 /// Shapes and reactions under prescribed displacements. It caches the factor for the last nodes.
 class HeldContacts {
@@ -30,14 +30,14 @@ public:
   /// their nodes. Copies share them.
   struct Past {
     std::shared_ptr<Held> held{};
-    CopyOnWrite<ShapeModes> modes{}; ///< displacements to shape
+    CopyOnWrite<compliance::ShapeModes> modes{}; ///< displacements to shape
   };
   const Past& past() const noexcept { return now_; }
   void restore(const Past& past) { now_ = past; }
 
   /// Keeps a reference to the model.
   /// \param free  whether K is singular; displacements may then fail to hold the model
-  HeldContacts(const Model& model, const Context& context, bool free)
+  HeldContacts(const model::Model& model, const Context& context, bool free)
       : model_(model), context_(context), free_(free), axes_(3 * model.nodes.size()) {}
   HeldContacts(const HeldContacts&) = delete;
   HeldContacts& operator=(const HeldContacts&) = delete;
@@ -45,29 +45,29 @@ public:
   /// Computes the shape under a load. \return reactions of its displaced nodes, by ascending node
   /// \throw Error as the factor
   /// \throw SingularStiffness if a free model can move nevertheless
-  std::vector<NodeVector> meet(const Load& now, std::vector<double>& u);
+  std::vector<contact::NodeVector> meet(const contact::Load& now, std::vector<double>& u);
   /// Columns of the compliance with the nodes of the last load held. \pre a load was met
-  const ColumnCache& columns(std::span<const std::uint32_t> nodes);
+  const columns::ColumnCache& columns(std::span<const std::uint32_t> nodes);
 
   std::uint64_t factors() const noexcept { return factors_; }
   std::uint64_t solves() const noexcept { return solves_; }
 
 private:
-  void refactor(const Load& now);
+  void refactor(const contact::Load& now);
   void solve(const Held& held, std::span<double> over_axes, std::size_t columns);
   void shape_under(std::span<const double> f, std::span<const double> prescribed,
                    std::vector<double>& shape);
 
-  const Model& model_;
+  const model::Model& model_;
   const Context& context_;
   bool free_;
   std::size_t axes_; ///< 3 n
-  std::optional<StiffnessOperator> stiffness_;
+  std::optional<fem::StiffnessOperator> stiffness_;
   /// What follows from the displaced nodes.
   struct Held {
     std::map<std::uint32_t, Vec3> nodes;
-    std::optional<AxisSolver> solver; ///< empty if no axis is free
-    std::optional<ColumnCache> columns;
+    std::optional<compliance::AxisSolver> solver; ///< empty if no axis is free
+    std::optional<columns::ColumnCache> columns;
     std::map<std::uint32_t, Vec3> base_force;
     Vec3 base_gravity;
     std::vector<double> base; ///< the shape with all displacements 0, under these; empty: unknown
@@ -76,4 +76,4 @@ private:
   std::uint64_t factors_ = 0, solves_ = 0;
 };
 
-} // namespace gewebe
+} // namespace gewebe::statics

@@ -5,12 +5,12 @@
 #include <algorithm>
 #include <cmath>
 
-namespace gewebe {
+namespace gewebe::statics {
 
 namespace {
 
 template <class Visit>
-void visit_edges(const Model& model, const Visit& visit) {
+void visit_edges(const model::Model& model, const Visit& visit) {
   if (!model.tetrahedra.empty()) {
     for (const Triangle& t : model.triangles)
       for (std::size_t k = 0; k < 3; ++k)
@@ -18,8 +18,8 @@ void visit_edges(const Model& model, const Visit& visit) {
           visit(t[k], t[(k + 1) % 3]);
     return;
   }
-  for (const Spring& spring : model.springs) {
-    if (spring.kind != SpringKind::edge)
+  for (const model::Spring& spring : model.springs) {
+    if (spring.kind != model::SpringKind::edge)
       break; // edges come first
     visit(spring.i, spring.j);
   }
@@ -27,7 +27,7 @@ void visit_edges(const Model& model, const Visit& visit) {
 
 } // namespace
 
-LinearRange linear_range(const Model& model, std::span<const double> displacement) {
+LinearRange linear_range(const model::Model& model, std::span<const double> displacement) {
   LinearRange range;
   visit_edges(model, [&](std::uint32_t i, std::uint32_t j) {
     const Vec3 along = model.nodes[j].position - model.nodes[i].position;
@@ -47,7 +47,7 @@ LinearRange linear_range(const Model& model, std::span<const double> displacemen
   return range;
 }
 
-double shortest_edge(const Model& model) {
+double shortest_edge(const model::Model& model) {
   double shortest = HUGE_VAL;
   visit_edges(model, [&](std::uint32_t i, std::uint32_t j) {
     shortest = std::min(shortest, norm(model.nodes[j].position - model.nodes[i].position));
@@ -55,4 +55,4 @@ double shortest_edge(const Model& model) {
   return shortest;
 }
 
-} // namespace gewebe
+} // namespace gewebe::statics

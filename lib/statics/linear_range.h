@@ -7,7 +7,7 @@
 #include <cstdint>
 #include <span>
 
-namespace gewebe {
+namespace gewebe::statics {
 
 /// Largest strain and rotation of an edge, to be compared with the range of linear elasticity. The
 /// strain is the change of length over length. The rotation is the displacement of one end against
@@ -18,9 +18,9 @@ struct LinearRange {
   std::array<std::uint32_t, 2> strain_edge{}, turn_edge{}; ///< where
 };
 /// \pre displacements of all nodes, or of a solid's first surface_count(model)
-LinearRange linear_range(const Model& model, std::span<const double> displacement);
+LinearRange linear_range(const model::Model& model, std::span<const double> displacement);
 
 /// Length of the shortest edge at rest, mm, of the same edges.
-double shortest_edge(const Model& model);
+double shortest_edge(const model::Model& model);
 
-} // namespace gewebe
+} // namespace gewebe::statics

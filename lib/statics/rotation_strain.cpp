@@ -8,7 +8,7 @@
 #include <algorithm>
 #include <utility>
 
-namespace gewebe {
+namespace gewebe::statics {
 
 namespace {
 
@@ -21,8 +21,8 @@ Vec3 at(std::span<const double> v, std::uint32_t node) {
 
 /// Entries of the whole Laplacian between nodes inside, which have rows, and others.
 template <class Visit>
-void visit_between(const StiffnessMatrix& laplacian, std::span<const std::int64_t> inner_row,
-                   const Visit& visit) {
+void visit_between(const linalg::StiffnessMatrix& laplacian,
+                   std::span<const std::int64_t> inner_row, const Visit& visit) {
   for (std::size_t i = 0; i < inner_row.size(); ++i)
     for (auto e = static_cast<std::size_t>(laplacian.column_start[i]);
          e < static_cast<std::size_t>(laplacian.column_start[i + 1]); ++e) {
@@ -35,8 +35,9 @@ void visit_between(const StiffnessMatrix& laplacian, std::span<const std::int64_
 
 } // namespace
 
-void RotationStrain::list_triangles(const TetMesh& mesh, std::span<const std::uint8_t> fixed) {
-  const TetBoundary faces = boundary(mesh);
+void RotationStrain::list_triangles(const tetrahedra::TetMesh& mesh,
+                                    std::span<const std::uint8_t> fixed) {
+  const tetrahedra::TetBoundary faces = tetrahedra::boundary(mesh);
   place_.assign(mesh.points.size(), none);
   std::vector<std::uint32_t> middles;
   for (const std::uint32_t i : faces.node)
@@ -116,7 +117,7 @@ void RotationStrain::list_triangles(const TetMesh& mesh, std::span<const std::ui
 
 /// `stiffness` times the surface's Laplacian and `mass` times its areas, on the first axes that
 /// have rows.
-void RotationStrain::fill_surface_matrix(StiffnessMatrix& matrix, double stiffness,
+void RotationStrain::fill_surface_matrix(linalg::StiffnessMatrix& matrix, double stiffness,
                                          double mass) const {
   matrix.column_start.push_back(0);
   std::vector<std::pair<std::int64_t, double>> column;
@@ -149,15 +150,15 @@ void RotationStrain::fill_surface_matrix(StiffnessMatrix& matrix, double stiffne
 }
 
 /// Rotations of shorter waves than the body is thick are no rotations of the body.
-void RotationStrain::factor_smoothing(std::span<const SolidElement> elements,
+void RotationStrain::factor_smoothing(std::span<const fem::SolidElement> elements,
                                       const Context& context) {
   double volume = 0, area = 0;
-  for (const SolidElement& e : elements)
+  for (const fem::SolidElement& e : elements)
     volume += e.volume;
   for (const Triangle& t : triangles_)
     area += t.area;
   const double length = smoothing_lengths * volume / area;
-  StiffnessMatrix matrix; // scalar: the first axis of each node
+  linalg::StiffnessMatrix matrix; // scalar: the first axis of each node
   matrix.row_of_axis.assign(3 * corners_, -1);
   for (std::size_t i = 0; i < corners_; ++i) {
     matrix.row_of_axis[3 * i] = static_cast<std::int64_t>(i);
@@ -200,7 +201,7 @@ void RotationStrain::factor_surface(std::span<const std::uint8_t> fixed, const C
 
     Laplacian laplacian;
     laplacian.row.assign(corners_, -1);
-    StiffnessMatrix matrix; // scalar: the first axis of each node
+    linalg::StiffnessMatrix matrix; // scalar: the first axis of each node
     matrix.row_of_axis.assign(3 * corners_, -1);
     for (std::size_t i = 0; i < corners_; ++i)
       if (!held(i, axis)) {
@@ -216,7 +217,8 @@ void RotationStrain::factor_surface(std::span<const std::uint8_t> fixed, const C
   }
 }
 
-RotationStrain::RotationStrain(const TetMesh& mesh, std::span<const SolidElement> elements,
+RotationStrain::RotationStrain(const tetrahedra::TetMesh& mesh,
+                               std::span<const fem::SolidElement> elements,
                                std::span<const std::uint8_t> fixed, const Context& context)
     : cpu_(context.cpu) {
   list_triangles(mesh, fixed);
@@ -228,8 +230,8 @@ RotationStrain::RotationStrain(const TetMesh& mesh, std::span<const SolidElement
   std::vector<std::uint8_t> first_axis(3 * n, 1);
   std::vector<std::uint8_t> used(n);
   for (std::size_t t = 0; t < mesh.tetrahedra.size(); ++t)
-    for (std::size_t a = 0; a < solid_nodes(mesh); ++a)
-      used[solid_node(mesh, t, a)] = 1;
+    for (std::size_t a = 0; a < fem::solid_nodes(mesh); ++a)
+      used[fem::solid_node(mesh, t, a)] = 1;
   bool any_inside = false;
   for (std::size_t i = 0; i < n; ++i) {
     first_axis[3 * i] = used[i] == 0 || place_[i] != none;
@@ -237,21 +239,22 @@ RotationStrain::RotationStrain(const TetMesh& mesh, std::span<const SolidElement
   }
   if (!any_inside)
     return;
-  const BlockOf laplacian = [&](std::size_t t, std::size_t a, std::size_t b) {
-    SolidElement e = elements[t];
+  const fem::BlockOf laplacian = [&](std::size_t t, std::size_t a, std::size_t b) {
+    fem::SolidElement e = elements[t];
     e.material = {0, 1}; // of whose block the trace is four times ∫ ∇Na·∇Nb
-    const SolidBlock block =
-        mesh.middles.empty() ? linear_block(e, a, b) : plain_quadratic_block(e, a, b);
-    return SolidBlock{(block[0] + block[4] + block[8]) / 4};
+    const fem::SolidBlock block =
+        mesh.middles.empty() ? fem::linear_block(e, a, b) : fem::plain_quadratic_block(e, a, b);
+    return fem::SolidBlock{(block[0] + block[4] + block[8]) / 4};
   };
-  const StiffnessMatrix inside = assembled_matrix(mesh, laplacian, first_axis, context);
+  const linalg::StiffnessMatrix inside =
+      fem::assembled_matrix(mesh, laplacian, first_axis, context);
   inside_.emplace(inside, context);
   inner_row_.resize(n);
   for (std::size_t i = 0; i < n; ++i) {
     inner_row_[i] = inside.row_of_axis[3 * i];
     first_axis[3 * i] = 0;
   }
-  between_ = assembled_matrix(mesh, laplacian, first_axis, context);
+  between_ = fem::assembled_matrix(mesh, laplacian, first_axis, context);
 }
 
 RotationStrain::~RotationStrain() = default;
@@ -421,4 +424,4 @@ std::vector<double> RotationStrain::extend(std::span<const double> surface) cons
   return all;
 }
 
-} // namespace gewebe
+} // namespace gewebe::statics

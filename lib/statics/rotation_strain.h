@@ -39,7 +39,7 @@
 #include <span>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::statics {
 
 struct TriangleGroup;
 struct MiddleGroup;
@@ -50,7 +50,7 @@ public:
   /// nodes) and inside, together a few hundredths of K's. \pre as solid_stiffness
   /// \throw Error if a part of the surface has no corner that is fixed along an axis, to be built
   /// from, as that of a cavity; Cancelled
-  RotationStrain(const TetMesh& mesh, std::span<const SolidElement> elements,
+  RotationStrain(const tetrahedra::TetMesh& mesh, std::span<const fem::SolidElement> elements,
                  std::span<const std::uint8_t> fixed, const Context& context = {});
 
   ~RotationStrain();
@@ -104,13 +104,13 @@ private:
   struct Laplacian {
     std::vector<std::int64_t> row; ///< of each node, or -1
     std::size_t order = 0;
-    std::optional<Factor> factor; ///< none where no node is free
+    std::optional<linalg::Factor> factor; ///< none where no node is free
   };
   void solve(std::span<const double> f, std::span<double> y) const;
-  void list_triangles(const TetMesh& mesh, std::span<const std::uint8_t> fixed);
-  void fill_surface_matrix(StiffnessMatrix& matrix, double stiffness, double mass) const;
+  void list_triangles(const tetrahedra::TetMesh& mesh, std::span<const std::uint8_t> fixed);
+  void fill_surface_matrix(linalg::StiffnessMatrix& matrix, double stiffness, double mass) const;
   void factor_surface(std::span<const std::uint8_t> fixed, const Context& context);
-  void factor_smoothing(std::span<const SolidElement> elements, const Context& context);
+  void factor_smoothing(std::span<const fem::SolidElement> elements, const Context& context);
   std::vector<double> smoothed(std::span<const double> of_triangles) const;
 
   std::vector<std::uint32_t> nodes_, place_;
@@ -122,11 +122,11 @@ private:
   CpuLevel cpu_;
   std::vector<std::size_t> start_; ///< of each corner's triangles
   std::vector<std::uint32_t> at_;
-  std::optional<Factor> smoothing_;
-  std::vector<Laplacian> axes_;         ///< one for all axes, or one for each
-  std::optional<Factor> inside_;        ///< of the Laplacian on inner nodes, if there are any
-  std::vector<std::int64_t> inner_row_; ///< of each node of the mesh
-  StiffnessMatrix between_;             ///< the whole Laplacian of the volume
+  std::optional<linalg::Factor> smoothing_;
+  std::vector<Laplacian> axes_;          ///< one for all axes, or one for each
+  std::optional<linalg::Factor> inside_; ///< of the Laplacian on inner nodes, if there are any
+  std::vector<std::int64_t> inner_row_;  ///< of each node of the mesh
+  linalg::StiffnessMatrix between_;      ///< the whole Laplacian of the volume
 };
 
-} // namespace gewebe
+} // namespace gewebe::statics

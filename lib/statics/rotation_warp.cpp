@@ -13,7 +13,7 @@
 #include <optional>
 #include <utility>
 
-namespace gewebe {
+namespace gewebe::statics {
 
 namespace {
 
@@ -39,7 +39,7 @@ double sum_of_sizes(std::span<const double> v) {
 double largest_difference(std::span<const double> a, std::span<const double> b) {
   double most = 0;
   for (std::size_t k = 0; k < a.size(); ++k)
-    most = larger(most, std::abs(a[k] - b[k]));
+    most = numeric::larger(most, std::abs(a[k] - b[k]));
   return most;
 }
 
@@ -194,7 +194,8 @@ void WarpColumns::solve_held(std::span<const std::uint8_t> held, std::span<doubl
     x[held_columns_[k]] = part[k];
 }
 
-RotationWarp::RotationWarp(const TetMesh& mesh, std::span<const SolidElement> elements,
+RotationWarp::RotationWarp(const tetrahedra::TetMesh& mesh,
+                           std::span<const fem::SolidElement> elements,
                            std::span<const std::uint8_t> fixed, WarpSolve solve,
                            const Context& context)
     : surface_(mesh, elements, fixed, context), solve_(std::move(solve)),
@@ -390,12 +391,12 @@ void RotationWarp::answer(const WarpLoad& load, WarpState& state,
     if (holds) {
       surface_.deform(state.local, state.frames, state.u);
       find_missed();
-      change = larger(change, largest(missed));
+      change = numeric::larger(change, largest(missed));
     }
     state.change = size == 0 ? 0 : change / size;
     const double force = largest(part.holding(next));
     if (holds && force != 0) // forces have a wider tolerance
-      state.change = larger(
+      state.change = numeric::larger(
           state.change,
           fair_force * largest_difference(part.holding(next), part.holding(round.z)) / force);
     const bool last = state.change <= options.tolerance || state.rounds >= options.max_rounds;
@@ -517,4 +518,4 @@ Vector RotationWarp::whole_shape(const WarpState& state,
   return shape;
 }
 
-} // namespace gewebe
+} // namespace gewebe::statics

@@ -48,7 +48,7 @@
 #include <span>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::statics {
 
 /// u = K⁻¹ f in place, over all 3 n axes; 0 on fixed ones.
 using WarpSolve = std::function<void(std::span<double>)>;
@@ -144,7 +144,7 @@ class RotationWarp {
 public:
   /// Costs what RotationStrain does. \pre K is that of the mesh's elements, or of these and what
   /// else acts between its nodes; `solve` is of it, and outlives this   \throw as RotationStrain
-  RotationWarp(const TetMesh& mesh, std::span<const SolidElement> elements,
+  RotationWarp(const tetrahedra::TetMesh& mesh, std::span<const fem::SolidElement> elements,
                std::span<const std::uint8_t> fixed, WarpSolve solve, const Context& context = {});
 
   const RotationStrain& surface() const noexcept { return surface_; }
@@ -187,4 +187,4 @@ private:
   const WarpKernel& kernel_;
 };
 
-} // namespace gewebe
+} // namespace gewebe::statics

@@ -5,17 +5,17 @@
 #include <tuple>
 #include <utility>
 
-namespace gewebe {
+namespace gewebe::statics {
 
-bool same_but_stiffness(const Model& first, const Model& second) {
+bool same_but_stiffness(const model::Model& first, const model::Model& second) {
   return std::equal(first.nodes.begin(), first.nodes.end(), second.nodes.begin(),
                     second.nodes.end(),
-                    [](const Node& a, const Node& b) {
+                    [](const model::Node& a, const model::Node& b) {
                       return a.position == b.position && a.fixed == b.fixed;
                     }) &&
          std::equal(first.springs.begin(), first.springs.end(), second.springs.begin(),
                     second.springs.end(),
-                    [](const Spring& a, const Spring& b) {
+                    [](const model::Spring& a, const model::Spring& b) {
                       return a.i == b.i && a.j == b.j && a.kind == b.kind;
                     }) &&
          first.triangles == second.triangles && first.tetrahedra == second.tetrahedra &&
@@ -23,26 +23,27 @@ bool same_but_stiffness(const Model& first, const Model& second) {
          first.tetrahedron_material == second.tetrahedron_material;
 }
 
-Model cut_second_stage(const Model& cut, std::span<const std::uint32_t> origin, const Model& first,
-                       const Model& second) {
-  const auto key = [](const Spring& s, std::uint32_t i, std::uint32_t j) {
+model::Model cut_second_stage(const model::Model& cut, std::span<const std::uint32_t> origin,
+                              const model::Model& first, const model::Model& second) {
+  const auto key = [](const model::Spring& s, std::uint32_t i, std::uint32_t j) {
     return std::tuple(std::min(i, j), std::max(i, j), s.kind);
   };
-  std::map<std::tuple<std::uint32_t, std::uint32_t, SpringKind>, std::pair<double, double>> sums;
+  std::map<std::tuple<std::uint32_t, std::uint32_t, model::SpringKind>, std::pair<double, double>>
+      sums;
   for (std::size_t k = 0; k < first.springs.size(); ++k) {
-    const Spring& s = first.springs[k];
+    const model::Spring& s = first.springs[k];
     auto& [one, two] = sums[key(s, s.i, s.j)];
     one += s.stiffness;
     two += second.springs[k].stiffness;
   }
-  Model stiff = cut;
+  model::Model stiff = cut;
   if (!cut.tetrahedra.empty())
     stiff.materials = second.materials;
-  for (Spring& s : stiff.springs) {
+  for (model::Spring& s : stiff.springs) {
     const auto& [one, two] = sums.at(key(s, origin[s.i], origin[s.j]));
     s.stiffness *= two / one;
   }
   return stiff;
 }
 
-} // namespace gewebe
+} // namespace gewebe::statics

@@ -6,7 +6,7 @@
 #include <cmath>
 #include <utility>
 
-namespace gewebe {
+namespace gewebe::statics {
 
 namespace {
 
@@ -15,7 +15,7 @@ struct Faces {
   double volume = 0;
 };
 
-Faces faces_of(const Model& model, std::span<const double> displacement) {
+Faces faces_of(const model::Model& model, std::span<const double> displacement) {
   const auto at = [&](std::size_t i) {
     const Vec3& p = model.nodes[i].position;
     return displacement.empty()
@@ -42,7 +42,7 @@ Faces faces_of(const Model& model, std::span<const double> displacement) {
 }
 
 /// Whether each edge is run along once in either direction.
-bool is_closed(const Model& model) {
+bool is_closed(const model::Model& model) {
   std::vector<std::pair<std::uint32_t, std::uint32_t>> out, back;
   for (const Triangle& t : model.triangles)
     for (std::size_t k = 0; k < 3; ++k) {
@@ -56,16 +56,17 @@ bool is_closed(const Model& model) {
 
 } // namespace
 
-ShapeCheck::ShapeCheck(const Model& model) {
+ShapeCheck::ShapeCheck(const model::Model& model) {
   Faces faces = faces_of(model, {});
   turned_ = std::move(faces.turned);
   volume_ = faces.volume;
   closed_ = is_closed(model);
-  const double shortest = gewebe::shortest_edge(model);
+  const double shortest = gewebe::statics::shortest_edge(model);
   shortest_edge_ = std::isfinite(shortest) ? shortest : 0;
 }
 
-ShapeFaults ShapeCheck::look(const Model& model, std::span<const double> displacement) const {
+ShapeFaults ShapeCheck::look(const model::Model& model,
+                             std::span<const double> displacement) const {
   const Faces faces = faces_of(model, displacement);
   ShapeFaults faults;
   for (std::size_t t = faces.turned.size(); t-- > 0;)
@@ -82,4 +83,4 @@ ShapeFaults ShapeCheck::look(const Model& model, std::span<const double> displac
   return faults;
 }
 
-} // namespace gewebe
+} // namespace gewebe::statics

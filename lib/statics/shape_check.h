@@ -8,7 +8,7 @@
 #include <span>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::statics {
 
 /// Faults of a shape.
 struct ShapeFaults {
@@ -24,11 +24,11 @@ struct ShapeFaults {
 /// that rotates as a whole has no inverted triangle.
 class ShapeCheck {
 public:
-  explicit ShapeCheck(const Model& model);
+  explicit ShapeCheck(const model::Model& model);
   /// Finds the faults of a shape. Time is linear in nodes, triangles and edges.
   /// \pre the model is that of the constructor; `displacement` has 3 numbers for each of its nodes,
   /// or for the first ones, with all corners of triangles and ends of springs among them
-  ShapeFaults look(const Model& model, std::span<const double> displacement) const;
+  ShapeFaults look(const model::Model& model, std::span<const double> displacement) const;
   double shortest_edge() const noexcept { return shortest_edge_; }
 
 private:
@@ -37,4 +37,4 @@ private:
   double volume_ = 0, shortest_edge_ = 0;
 };
 
-} // namespace gewebe
+} // namespace gewebe::statics

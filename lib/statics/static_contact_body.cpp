@@ -9,7 +9,7 @@
 #include <map>
 #include <utility>
 
-namespace gewebe {
+namespace gewebe::statics {
 
 using contact::Block3, contact::VertexForce;
 
@@ -133,13 +133,13 @@ bool StaticContactBody::keep_momentum(double room) {
 
 // ---- the linear method
 
-std::span<const double> ElastostaticContactBody::shape_under(const Load& load) {
+std::span<const double> ElastostaticContactBody::shape_under(const contact::Load& load) {
   Elastostatic& solver = solver_();
   if (clusters_.empty()) {
     solver.update(load);
     return solver.surface_displacement();
   }
-  std::vector<NodeVector> forces;
+  std::vector<contact::NodeVector> forces;
   for (const auto& [node, force] : load.force)
     forces.push_back({node, force});
   shape_ = solver.displacement_of_clusters(clusters_, forces);
@@ -153,7 +153,7 @@ void ElastostaticContactBody::blocks_of(std::uint32_t node, std::span<const std:
 
 // ---- two steps
 
-std::span<const double> TwoStepContactBody::shape_under(const Load& load) {
+std::span<const double> TwoStepContactBody::shape_under(const contact::Load& load) {
   const auto [first, both] = stages_();
   both.update(first, load);
   return both.surface_displacement(first);
@@ -177,7 +177,7 @@ void TwoStepContactBody::blocks_of(std::uint32_t node, std::span<const std::uint
 
 // ---- large rotations
 
-std::span<const double> WarpedContactBody::shape_under(const Load& load) {
+std::span<const double> WarpedContactBody::shape_under(const contact::Load& load) {
   WarpedStatics& solver = solver_();
   solver.update(load, touched_);
   compliance_.clear();
@@ -201,4 +201,4 @@ void WarpedContactBody::blocks_of(std::uint32_t node, std::span<const std::uint3
         blocks[k][3 * i + j] = compliance_[(3 * at + j) * order + 3 * k + i];
 }
 
-} // namespace gewebe
+} // namespace gewebe::statics

@@ -17,13 +17,13 @@
 #include <span>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::statics {
 
 /// Displacement of an object, and forces on it.
 struct StaticContactState {
-  const Model* model = nullptr;
+  const model::Model* model = nullptr;
   const contact::ModelSurface* surface = nullptr;
-  const Load* load = nullptr; ///< at the end of the step
+  const contact::Load* load = nullptr; ///< at the end of the step
   /// At its beginning, of the surface: of node i at 3 i, or of vertex k at 3 place[k] where given.
   std::span<const double> displacement{};
   std::span<const std::uint32_t> place{};
@@ -58,18 +58,18 @@ public:
     return vector_at(std::span<const double>(displacement_), place_of(vertex));
   }
   /// Load with contact forces.
-  const Load& acting() const { return acting_; }
+  const contact::Load& acting() const { return acting_; }
 
 protected:
-  const Load& load() const { return *state_.load; }
-  const Model& model() const { return *state_.model; }
+  const contact::Load& load() const { return *state_.load; }
+  const model::Model& model() const { return *state_.model; }
 
 private:
   std::uint32_t place_of(std::size_t vertex) const {
     return state_.place.empty() ? state_.surface->node[vertex] : state_.place[vertex];
   }
   /// Displacement under a load, of the surface's nodes at least.
-  virtual std::span<const double> shape_under(const Load& load) = 0;
+  virtual std::span<const double> shape_under(const contact::Load& load) = 0;
   /// Error of shape_under, over the largest displacement.
   virtual double shape_tolerance() const { return 0; }
   /// Blocks [row][force] of the compliance near the last shape. \param nodes  rows
@@ -78,7 +78,7 @@ private:
   void act(std::span<const contact::VertexForce> forces);
 
   StaticContactState state_;
-  Load acting_;
+  contact::Load acting_;
   std::vector<double> displacement_, begin_, step_;
   // Of the quadratic model.
   std::vector<double> shape_; ///< under `forces_`
@@ -99,7 +99,7 @@ public:
   std::uint64_t matrix_id() const override { return solver_().compliance_id(load()); }
 
 private:
-  std::span<const double> shape_under(const Load& load) override;
+  std::span<const double> shape_under(const contact::Load& load) override;
   void blocks_of(std::uint32_t node, std::span<const std::uint32_t> nodes,
                  std::span<contact::Block3> blocks) override;
   std::function<Elastostatic&()> solver_;
@@ -116,7 +116,7 @@ public:
   bool is_linear() const override { return false; }
 
 private:
-  std::span<const double> shape_under(const Load& load) override;
+  std::span<const double> shape_under(const contact::Load& load) override;
   void blocks_of(std::uint32_t node, std::span<const std::uint32_t> nodes,
                  std::span<contact::Block3> blocks) override;
   Stages stages_;
@@ -130,7 +130,7 @@ public:
   bool is_linear() const override { return false; }
 
 private:
-  std::span<const double> shape_under(const Load& load) override;
+  std::span<const double> shape_under(const contact::Load& load) override;
   double shape_tolerance() const override { return warp_tolerance; }
   void blocks_of(std::uint32_t node, std::span<const std::uint32_t> nodes,
                  std::span<contact::Block3> blocks) override;
@@ -139,4 +139,4 @@ private:
   std::vector<double> compliance_; ///< between these
 };
 
-} // namespace gewebe
+} // namespace gewebe::statics

@@ -6,7 +6,7 @@
 #include <array>
 #include <cstddef>
 
-namespace gewebe {
+namespace gewebe::statics {
 
 namespace {
 
@@ -36,7 +36,8 @@ double SurfaceTiles::Tile::bound(std::span<const double> bounds) const {
   return most;
 }
 
-SurfaceTiles::SurfaceTiles(const contact::ModelSurface& surface, const NodeClusters& clusters)
+SurfaceTiles::SurfaceTiles(const contact::ModelSurface& surface,
+                           const columns::NodeClusters& clusters)
     : surface_(surface), clusters_(clusters), cluster_(surface.node.size()),
       place_(surface.node.size()), tile_(surface.node.size()) {
   std::vector<std::uint32_t> cluster_of(clusters.node.size()), place_of(clusters.node.size());
@@ -58,8 +59,8 @@ SurfaceTiles::SurfaceTiles(const contact::ModelSurface& surface, const NodeClust
     all.push_back(static_cast<std::uint32_t>(all.size()));
     middle.push_back((own.rest[a] + own.rest[b] + own.rest[c]) / 3);
   }
-  NodeClusters groups;
-  append_clusters(middle, all, tile_triangles, groups);
+  columns::NodeClusters groups;
+  columns::append_clusters(middle, all, tile_triangles, groups);
   for (std::size_t g = 0; g < groups.size(); ++g) {
     Tile& tile = tiles_.emplace_back();
     for (const std::uint32_t t : groups.nodes(g)) {
@@ -150,4 +151,4 @@ SurfacePatch SurfaceTiles::part(std::span<const std::uint32_t> tiles) const {
   return part;
 }
 
-} // namespace gewebe
+} // namespace gewebe::statics

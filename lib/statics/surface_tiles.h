@@ -12,7 +12,7 @@
 #include <span>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::statics {
 
 /// Part of a surface, with what its displacement is found from.
 struct SurfacePatch {
@@ -26,7 +26,7 @@ struct SurfacePatch {
 class SurfaceTiles {
 public:
   /// Keeps both by reference. \param clusters  hold each node of the surface
-  SurfaceTiles(const contact::ModelSurface& surface, const NodeClusters& clusters);
+  SurfaceTiles(const contact::ModelSurface& surface, const columns::NodeClusters& clusters);
 
   /// Tiles that may meet one of these boxes, ascending.
   /// \param bounds  by cluster: of the displacement of its nodes, mm
@@ -47,9 +47,9 @@ private:
     double bound(std::span<const double> bounds) const;
   };
   const contact::ModelSurface& surface_;
-  const NodeClusters& clusters_;
+  const columns::NodeClusters& clusters_;
   std::vector<Tile> tiles_;
   std::vector<std::uint32_t> cluster_, place_, tile_; ///< by vertex; place_: in the cluster
 };
 
-} // namespace gewebe
+} // namespace gewebe::statics

@@ -18,7 +18,7 @@
 // Based on: H. Çakmak, U. Kühnapfel, G. Bretthauer, report FZKA 7190, 2006, section 3.3.3;
 // M. Bro-Nielsen, Finite element modeling in surgery simulation, 1998.
 
-namespace gewebe {
+namespace gewebe::statics {
 
 namespace {
 
@@ -34,20 +34,21 @@ Vector vector(std::span<const double> values) {
   return {values.data(), static_cast<Index>(values.size())};
 }
 
-double outer_force(const Model& model, const Load& load, std::uint32_t node, int axis) {
+double outer_force(const model::Model& model, const contact::Load& load, std::uint32_t node,
+                   int axis) {
   const auto force = load.force.find(node);
   return (force == load.force.end() ? 0 : force->second[axis]) +
          model.nodes[node].mass * load.gravity[axis];
 }
 
 /// Norm of the load over the free axes; with those of displaced nodes if `displaced_too`.
-double norm_of(const Model& model, const Load& load, bool displaced_too) {
+double norm_of(const model::Model& model, const contact::Load& load, bool displaced_too) {
   double sum = 0;
   const auto add = [&](std::uint32_t node) {
     if (!displaced_too && load.displacement.contains(node))
       return;
     for (int a = 0; a < 3; ++a)
-      if (!is_fixed(model, node, a)) {
+      if (!contact::is_fixed(model, node, a)) {
         const double f = outer_force(model, load, node, a);
         sum += f * f;
       }
@@ -63,7 +64,7 @@ double norm_of(const Model& model, const Load& load, bool displaced_too) {
 
 } // namespace
 
-double load_norm(const Model& model, const Load& load) {
+double load_norm(const model::Model& model, const contact::Load& load) {
   return norm_of(model, load, true);
 }
 
@@ -202,11 +203,11 @@ struct TwoStep::Past {
   /// The last load, its reactions, and its shapes once they were read.
   struct Last {
     TwoStepOptions options;
-    CopyOnWrite<std::optional<Load>> last{};
-    CopyOnWrite<std::vector<NodeVector>> forces{};
+    CopyOnWrite<std::optional<contact::Load>> last{};
+    CopyOnWrite<std::vector<contact::NodeVector>> forces{};
     double norm = 0, largest = 0;
     double s = 1;
-    CopyOnWrite<Load> total{}; // beyond the threshold: all forces, those of contact too
+    CopyOnWrite<contact::Load> total{}; // beyond the threshold: all forces, those of contact too
 
     /// That of `last`, where known.
     struct Shape {
@@ -225,11 +226,12 @@ struct TwoStep::Past {
 };
 
 struct TwoStep::State : Past::Last {
-  const Model& model;
+  const model::Model& model;
   Elastostatic second;
   double tolerance = 0;
 
-  State(const Model& m, std::shared_ptr<ComplianceSource> source, const Context& context, double t)
+  State(const model::Model& m, std::shared_ptr<compliance::ComplianceSource> source,
+        const Context& context, double t)
       : model(m), second(m, std::move(source), context, {.tolerance = t}), tolerance(t) {
     whole.u.write().resize(3 * m.nodes.size());
     surface = rough = whole;
@@ -249,7 +251,7 @@ struct TwoStep::State : Past::Last {
     const std::size_t rows = one.free.size();
     axes.clear();
     for (std::size_t r = 0; r < rows; ++r)
-      if (!is_fixed(model, one.nodes[r / 3], static_cast<int>(r % 3)))
+      if (!contact::is_fixed(model, one.nodes[r / 3], static_cast<int>(r % 3)))
         axes.push_back(r);
     if (axes.empty())
       return;
@@ -264,11 +266,11 @@ struct TwoStep::State : Past::Last {
   }
 
   /// Whether displacements take a load beyond the threshold; if so it is found.
-  bool beyond(Elastostatic& first, const Load& load) {
+  bool beyond(Elastostatic& first, const contact::Load& load) {
     std::vector<std::uint32_t> now;
     for (const auto& [node, d] : load.displacement)
       now.push_back(node);
-    Load outer = load;
+    contact::Load outer = load;
     outer.displacement.clear();
     const DelassusOperator one = first.delassus_operator(outer, now),
                            two = second.delassus_operator(outer, now);
@@ -288,12 +290,12 @@ struct TwoStep::State : Past::Last {
         contact->solve({d, v1, v2, carried, norm_of(model, load, false), options.threshold});
     if (!(answer.s < 1))
       return false;
-    std::vector<NodeVector> found;
+    std::vector<contact::NodeVector> found;
     for (const std::uint32_t node : now)
       found.push_back({node, {}});
     for (std::size_t k = 0; k < axes.size(); ++k)
       found[axes[k] / 3].value[static_cast<int>(axes[k] % 3)] = answer.force[k];
-    for (const NodeVector& f : found)
+    for (const contact::NodeVector& f : found)
       outer.force[f.node] += f.value;
     total = std::move(outer);
     forces = std::move(found);
@@ -302,7 +304,7 @@ struct TwoStep::State : Past::Last {
     return true;
   }
 
-  void update(Elastostatic& first, const Load& load) {
+  void update(Elastostatic& first, const contact::Load& load) {
     if (load.displacement.empty()) {
       norm = load_norm(model, load);
       s = norm > options.threshold ? options.threshold / norm : 1;
@@ -314,9 +316,9 @@ struct TwoStep::State : Past::Last {
     if (contact && beyond(first, load))
       return;
     first.update(load);
-    Load all = load;
+    contact::Load all = load;
     all.displacement.clear();
-    for (const NodeVector& f : first.contact_forces())
+    for (const contact::NodeVector& f : first.contact_forces())
       all.force[f.node] += f.value;
     norm = load_norm(model, all);
     if (norm > options.threshold && beyond(first, load))
@@ -366,7 +368,7 @@ struct TwoStep::State : Past::Last {
   }
 };
 
-TwoStep::TwoStep(const Model& model, std::shared_ptr<ComplianceSource> second,
+TwoStep::TwoStep(const model::Model& model, std::shared_ptr<compliance::ComplianceSource> second,
                  const Context& context, const TwoStepOptions& options, double tolerance) {
   if (second == nullptr)
     throw Error("the second stage has no factor, expected a store with one");
@@ -396,7 +398,7 @@ void TwoStep::restore(const Past& past) {
   static_cast<Past::Last&>(*state_) = past.last;
 }
 
-void TwoStep::update(Elastostatic& first, const Load& load) {
+void TwoStep::update(Elastostatic& first, const contact::Load& load) {
   State& state = *state_;
   if (*state.last == load)
     return;
@@ -409,7 +411,7 @@ void TwoStep::update(Elastostatic& first, const Load& load) {
   state.whole.known = state.surface.known = state.rough.known = false;
 }
 
-void TwoStep::second_compliance_blocks(const Load& load, std::uint32_t node,
+void TwoStep::second_compliance_blocks(const contact::Load& load, std::uint32_t node,
                                        std::span<const std::uint32_t> rows,
                                        std::span<std::array<double, 9>> blocks) {
   state_->second.compliance_blocks(load, node, rows, blocks);
@@ -447,7 +449,7 @@ void TwoStep::verify(Elastostatic& first) {
   state_->take_load(first);
   first.verify();
 }
-const std::vector<NodeVector>& TwoStep::contact_forces() const noexcept {
+const std::vector<contact::NodeVector>& TwoStep::contact_forces() const noexcept {
   return *state_->forces;
 }
 const TwoStepOptions& TwoStep::options() const noexcept {
@@ -466,4 +468,4 @@ ElastostaticCounts TwoStep::second_counts() const noexcept {
   return state_->second.counts();
 }
 
-} // namespace gewebe
+} // namespace gewebe::statics

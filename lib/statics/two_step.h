@@ -28,7 +28,7 @@
 #include <span>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::statics {
 
 struct TwoStepOptions {
   double threshold = 0; ///< f0 > 0, 1e-6 N
@@ -38,7 +38,7 @@ struct TwoStepOptions {
 };
 
 /// |f| of the given forces and weight over the free axes, without the reactions of displaced nodes.
-double load_norm(const Model& model, const Load& load);
+double load_norm(const model::Model& model, const contact::Load& load);
 
 /// Solver for the reactions of prescribed displacements in the two-step method: one problem in s,
 /// prepared for many displacements.
@@ -83,8 +83,8 @@ public:
   /// \param second  source of C2
   /// \param tolerance  of the second stage, see ElastostaticOptions; each stage has its own
   /// \throw Error if `second` is null or the threshold is not positive
-  TwoStep(const Model& model, std::shared_ptr<ComplianceSource> second, const Context& context,
-          const TwoStepOptions& options, double tolerance = 0);
+  TwoStep(const model::Model& model, std::shared_ptr<compliance::ComplianceSource> second,
+          const Context& context, const TwoStepOptions& options, double tolerance = 0);
   ~TwoStep();
   TwoStep(TwoStep&&) noexcept;
 
@@ -99,7 +99,7 @@ public:
   /// second stage is not used. \pre as Elastostatic::update
   /// \throw Error as Elastostatic::update, and if no force is found for the displacements, see
   /// TwoStepContact
-  void update(Elastostatic& first, const Load& load);
+  void update(Elastostatic& first, const contact::Load& load);
 
   /// As Elastostatic::displacement; computed by the first call after an update.
   /// \param first  that of the update; it may have been updated for other loads since
@@ -109,10 +109,10 @@ public:
   std::span<const double> rough_surface(Elastostatic& first);
   /// As Elastostatic::verify, of the first stage.
   void verify(Elastostatic& first);
-  const std::vector<NodeVector>& contact_forces() const noexcept;
+  const std::vector<contact::NodeVector>& contact_forces() const noexcept;
 
   /// As Elastostatic::compliance_blocks, of the second stage.
-  void second_compliance_blocks(const Load& load, std::uint32_t node,
+  void second_compliance_blocks(const contact::Load& load, std::uint32_t node,
                                 std::span<const std::uint32_t> rows,
                                 std::span<std::array<double, 9>> blocks);
 
@@ -127,4 +127,4 @@ private:
   std::unique_ptr<State> state_;
 };
 
-} // namespace gewebe
+} // namespace gewebe::statics

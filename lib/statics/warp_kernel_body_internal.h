@@ -4,11 +4,11 @@
 #include "numeric/four_lanes.h"
 #include "statics/warp_kernel_internal.h"
 
-namespace gewebe {
+namespace gewebe::statics {
 namespace {
 
 struct Vector {
-  Four x, y, z;
+  numeric::Four x, y, z;
 };
 /// By rows.
 struct Matrix {
@@ -18,9 +18,9 @@ struct Matrix {
 inline void gather(const double* values, const std::uint32_t* node, Vector& to) {
   const double *a = values + 3 * std::size_t{node[0]}, *b = values + 3 * std::size_t{node[1]},
                *c = values + 3 * std::size_t{node[2]}, *d = values + 3 * std::size_t{node[3]};
-  to.x = Four{a[0], b[0], c[0], d[0]};
-  to.y = Four{a[1], b[1], c[1], d[1]};
-  to.z = Four{a[2], b[2], c[2], d[2]};
+  to.x = numeric::Four{a[0], b[0], c[0], d[0]};
+  to.y = numeric::Four{a[1], b[1], c[1], d[1]};
+  to.z = numeric::Four{a[2], b[2], c[2], d[2]};
 }
 
 inline void scatter(const Vector& v, const std::uint32_t* node, double* values) {
@@ -39,9 +39,9 @@ inline void cross(const Vector& a, const Vector& b, Vector& c) {
 }
 
 inline void load(const double (*from)[4], Vector& to) {
-  to.x = four(from[0]);
-  to.y = four(from[1]);
-  to.z = four(from[2]);
+  to.x = numeric::four(from[0]);
+  to.y = numeric::four(from[1]);
+  to.z = numeric::four(from[2]);
 }
 
 /// The gradient of values at the triangles' nodes, along them.
@@ -51,7 +51,7 @@ inline void along(const TriangleGroup& t, const double* values, Matrix& m) {
     gather(values, t.node[k], v[k]);
   load(t.gradient[0], g);
   load(t.gradient[1], h);
-  const Four b[3]{v[1].x - v[0].x, v[1].y - v[0].y, v[1].z - v[0].z},
+  const numeric::Four b[3]{v[1].x - v[0].x, v[1].y - v[0].y, v[1].z - v[0].z},
       c[3]{v[2].x - v[0].x, v[2].y - v[0].y, v[2].z - v[0].z};
   for (int i = 0; i < 3; ++i) {
     m.row[i].x = b[i] * g.x + c[i] * h.x;
@@ -62,12 +62,12 @@ inline void along(const TriangleGroup& t, const double* values, Matrix& m) {
 
 /// Adds area m ∇N of each node.
 inline void add_divergence(const TriangleGroup& t, const Matrix& m, double* sum) {
-  const Four area = four(t.area);
+  const numeric::Four area = numeric::four(t.area);
   Vector part[2], first;
   for (int k = 0; k < 2; ++k) {
     Vector g;
     load(t.gradient[k], g);
-    const auto along_row = [&](const Vector& r, Four& to) {
+    const auto along_row = [&](const Vector& r, numeric::Four& to) {
       to = (r.x * g.x + r.y * g.y + r.z * g.z) * area;
     };
     along_row(m.row[0], part[k].x);
@@ -83,8 +83,8 @@ inline void add_divergence(const TriangleGroup& t, const Matrix& m, double* sum)
 }
 
 /// (1 - cos a) / a² and (a - sin a) / a³ of the angle a, by its square.
-inline void angle_terms(const Four& square, Four& second, Four& third) {
-  second = third = Four{};
+inline void angle_terms(const numeric::Four& square, numeric::Four& second, numeric::Four& third) {
+  second = third = numeric::Four{};
   constexpr int terms = 10;
   static constexpr double even[terms]{1.0 / 2,   1.0 / 12,  1.0 / 30,  1.0 / 56,  1.0 / 90,
                                       1.0 / 132, 1.0 / 182, 1.0 / 240, 1.0 / 306, 1.0 / 380},
@@ -100,7 +100,7 @@ inline void angle_terms(const Four& square, Four& second, Four& third) {
 /// is the rotation beyond w.
 struct State {
   Vector w;
-  Four second, third; ///< (1 - cos a) / a², (a - sin a) / a³ of the angle a
+  numeric::Four second, third; ///< (1 - cos a) / a², (a - sin a) / a³ of the angle a
   Matrix strain, rotation, inside;
 };
 
@@ -114,7 +114,7 @@ inline void gradient(const TriangleGroup& t, const double* local, Matrix& h) {
   tilt.x = n.x * h.row[0].x + n.y * h.row[1].x + n.z * h.row[2].x;
   tilt.y = n.x * h.row[0].y + n.y * h.row[1].y + n.z * h.row[2].y;
   tilt.z = n.x * h.row[0].z + n.y * h.row[1].z + n.z * h.row[2].z;
-  const auto turn = [&](const Four& of, Vector& row) {
+  const auto turn = [&](const numeric::Four& of, Vector& row) {
     row.x -= of * n.x;
     row.y -= of * n.y;
     row.z -= of * n.z;
@@ -133,9 +133,9 @@ inline void rotation_of(const Matrix& h, Vector& w) {
 
 /// Four vectors, one behind the other.
 inline void gather(const double* values, Vector& to) {
-  to.x = Four{values[0], values[3], values[6], values[9]};
-  to.y = Four{values[1], values[4], values[7], values[10]};
-  to.z = Four{values[2], values[5], values[8], values[11]};
+  to.x = numeric::Four{values[0], values[3], values[6], values[9]};
+  to.y = numeric::Four{values[1], values[4], values[7], values[10]};
+  to.z = numeric::Four{values[2], values[5], values[8], values[11]};
 }
 
 inline void put(const Vector& v, double* to) {
@@ -164,11 +164,12 @@ inline void state(const TriangleGroup& t, const double* local, const double* w, 
   e.row[0].z = e.row[2].x = 0.5 * (h.row[0].z + h.row[2].x);
   e.row[1].z = e.row[2].y = 0.5 * (h.row[1].z + h.row[2].y);
 
-  const Four xx = s.w.x * s.w.x, yy = s.w.y * s.w.y, zz = s.w.z * s.w.z, square = xx + yy + zz;
+  const numeric::Four xx = s.w.x * s.w.x, yy = s.w.y * s.w.y, zz = s.w.z * s.w.z,
+                      square = xx + yy + zz;
   angle_terms(square, s.second, s.third);
-  const Four first = 1 - square * s.third, diagonal = 1 - square * s.second,
-             xy = s.second * s.w.x * s.w.y, xz = s.second * s.w.x * s.w.z,
-             yz = s.second * s.w.y * s.w.z;
+  const numeric::Four first = 1 - square * s.third, diagonal = 1 - square * s.second,
+                      xy = s.second * s.w.x * s.w.y, xz = s.second * s.w.x * s.w.z,
+                      yz = s.second * s.w.y * s.w.z;
   Matrix& r = s.rotation;
   r.row[0].x = diagonal + s.second * xx;
   r.row[1].y = diagonal + s.second * yy;
@@ -185,9 +186,9 @@ inline void state(const TriangleGroup& t, const double* local, const double* w, 
   u.row[0].x = 1 + p.x + 0.5 * (p.x * p.x + p.y * p.y + p.z * p.z);
   u.row[1].y = 1 + q.y + 0.5 * (q.x * q.x + q.y * q.y + q.z * q.z);
   u.row[2].z = 1 + o.z + 0.5 * (o.x * o.x + o.y * o.y + o.z * o.z);
-  const Four pq = p.y + 0.5 * (p.x * q.x + p.y * q.y + p.z * q.z),
-             po = p.z + 0.5 * (p.x * o.x + p.y * o.y + p.z * o.z),
-             qo = q.z + 0.5 * (q.x * o.x + q.y * o.y + q.z * o.z);
+  const numeric::Four pq = p.y + 0.5 * (p.x * q.x + p.y * q.y + p.z * q.z),
+                      po = p.z + 0.5 * (p.x * o.x + p.y * o.y + p.z * o.z),
+                      qo = q.z + 0.5 * (q.x * o.x + q.y * o.y + q.z * o.z);
   u.row[0].y = pq - beyond.z;
   u.row[1].x = pq + beyond.z;
   u.row[0].z = po + beyond.y;
@@ -246,20 +247,20 @@ inline void turn_middles(const MiddleGroup* groups, std::size_t count, const dou
     off.x -= 0.5 * (first.x + end.x);
     off.y -= 0.5 * (first.y + end.y);
     off.z -= 0.5 * (first.z + end.z);
-    Four second, third;
-    const Four square = mean.x * mean.x + mean.y * mean.y + mean.z * mean.z;
+    numeric::Four second, third;
+    const numeric::Four square = mean.x * mean.x + mean.y * mean.y + mean.z * mean.z;
     angle_terms(square, second, third);
-    const Four sine = 1 - square * third;
+    const numeric::Four sine = 1 - square * third;
     cross(mean, off, once);
     cross(mean, once, twice);
     gather(u, g.a, at_a);
     gather(u, g.b, at_b);
-    const Four x = four(g.free[0]) *
-                   (0.5 * (at_a.x + at_b.x) + off.x + sine * once.x + second * twice.x),
-               y = four(g.free[1]) *
-                   (0.5 * (at_a.y + at_b.y) + off.y + sine * once.y + second * twice.y),
-               z = four(g.free[2]) *
-                   (0.5 * (at_a.z + at_b.z) + off.z + sine * once.z + second * twice.z);
+    const numeric::Four x = numeric::four(g.free[0]) *
+                            (0.5 * (at_a.x + at_b.x) + off.x + sine * once.x + second * twice.x),
+                        y = numeric::four(g.free[1]) *
+                            (0.5 * (at_a.y + at_b.y) + off.y + sine * once.y + second * twice.y),
+                        z = numeric::four(g.free[2]) *
+                            (0.5 * (at_a.z + at_b.z) + off.z + sine * once.z + second * twice.z);
     for (int lane = 0; lane < 4; ++lane) {
       double* const to = u + 3 * std::size_t{g.node[lane]};
       to[0] = x[lane];
@@ -292,7 +293,7 @@ inline void find_moments(const TriangleGroup* groups, std::size_t count, const d
     Matrix back;
     in_frames(groups[n], s, y, back);
     const auto across = [](const Vector& a, const Vector& b, const Vector& c, const Vector& d,
-                           Four& to) {
+                           numeric::Four& to) {
       to = (a.x * b.x + a.y * b.y + a.z * b.z) - (c.x * d.x + c.y * d.y + c.z * d.z);
     };
     const Vector *b = back.row, *u = s.inside.row;
@@ -332,9 +333,9 @@ inline void take_back(const TriangleGroup* groups, std::size_t count, const doub
     even.row[1].z = even.row[2].y = 0.5 * (back.row[1].z + back.row[2].y);
     Matrix strained;
     product(even, s.strain, strained);
-    const Four xy = even.row[0].y + 0.5 * (strained.row[0].y + strained.row[1].x),
-               xz = even.row[0].z + 0.5 * (strained.row[0].z + strained.row[2].x),
-               yz = even.row[1].z + 0.5 * (strained.row[1].z + strained.row[2].y);
+    const numeric::Four xy = even.row[0].y + 0.5 * (strained.row[0].y + strained.row[1].x),
+                        xz = even.row[0].z + 0.5 * (strained.row[0].z + strained.row[2].x),
+                        yz = even.row[1].z + 0.5 * (strained.row[1].z + strained.row[2].y);
     m.row[0].x = even.row[0].x + strained.row[0].x;
     m.row[1].y = even.row[1].y + strained.row[1].y;
     m.row[2].z = even.row[2].z + strained.row[2].z;
@@ -347,10 +348,10 @@ inline void take_back(const TriangleGroup* groups, std::size_t count, const doub
     // The normal turns with the surface.
     Vector normal;
     load(t.normal, normal);
-    Four along_normal[3];
+    numeric::Four along_normal[3];
     for (int i = 0; i < 3; ++i)
       along_normal[i] = m.row[i].x * normal.x + m.row[i].y * normal.y + m.row[i].z * normal.z;
-    const Four of_row[3]{normal.x, normal.y, normal.z};
+    const numeric::Four of_row[3]{normal.x, normal.y, normal.z};
     for (int i = 0; i < 3; ++i) {
       m.row[i].x -= of_row[i] * along_normal[0];
       m.row[i].y -= of_row[i] * along_normal[1];
@@ -366,12 +367,12 @@ void combine_some(const float* columns, std::size_t stride, std::size_t rows, co
                   double* sum) {
   std::size_t k = 0;
   for (; k + 4 <= rows; k += 4) {
-    Four total = four(sum + k), entry;
+    numeric::Four total = numeric::four(sum + k), entry;
     for (int c = 0; c < Width; ++c) {
-      load(columns + static_cast<std::size_t>(c) * stride + k, entry);
+      numeric::load(columns + static_cast<std::size_t>(c) * stride + k, entry);
       total += entry * factor[c];
     }
-    four(sum + k) = total;
+    numeric::four(sum + k) = total;
   }
   for (; k < rows; ++k)
     for (int c = 0; c < Width; ++c)
@@ -392,12 +393,12 @@ inline void combine(const float* columns, std::size_t stride, std::size_t rows,
 template <int Width>
 void project_some(const float* columns, std::size_t stride, std::size_t rows, const double* by,
                   double* product) {
-  Four sums[Width]{}, entry;
+  numeric::Four sums[Width]{}, entry;
   std::size_t k = 0;
   for (; k + 4 <= rows; k += 4)
     for (int c = 0; c < Width; ++c) {
-      load(columns + static_cast<std::size_t>(c) * stride + k, entry);
-      sums[c] += entry * four(by + k);
+      numeric::load(columns + static_cast<std::size_t>(c) * stride + k, entry);
+      sums[c] += entry * numeric::four(by + k);
     }
   for (int c = 0; c < Width; ++c) {
     double rest = 0;
@@ -417,4 +418,4 @@ inline void project(const float* columns, std::size_t stride, std::size_t rows, 
 }
 
 } // namespace
-} // namespace gewebe
+} // namespace gewebe::statics

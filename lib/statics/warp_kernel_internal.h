@@ -7,7 +7,7 @@
 #include <cstddef>
 #include <cstdint>
 
-namespace gewebe {
+namespace gewebe::statics {
 
 /// Four triangles side by side; those that fill up the last group are all 0.
 struct TriangleGroup {
@@ -58,4 +58,4 @@ inline const WarpKernel& warp_kernel(CpuLevel level) {
   return level == CpuLevel::baseline ? warp_kernel_baseline : warp_kernel_avx2;
 }
 
-} // namespace gewebe
+} // namespace gewebe::statics

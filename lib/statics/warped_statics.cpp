@@ -12,7 +12,7 @@
 #include <string>
 #include <utility>
 
-namespace gewebe {
+namespace gewebe::statics {
 
 namespace {
 
@@ -20,20 +20,20 @@ constexpr std::size_t few_nodes = 64, max_nodes = 1000;
 constexpr WarpOptions usual{.max_rounds = 30, .tolerance = warp_tolerance};
 constexpr double too_far = 1e-2;
 
-std::vector<std::uint8_t> fixed_axes(const Model& model) {
+std::vector<std::uint8_t> fixed_axes(const model::Model& model) {
   std::vector<std::uint8_t> fixed(3 * model.nodes.size());
   for (std::uint32_t i = 0; i < model.nodes.size(); ++i)
     for (int a = 0; a < 3; ++a)
-      fixed[axis_of(i, a)] = is_fixed(model, i, a) ? 1 : 0;
+      fixed[axis_of(i, a)] = contact::is_fixed(model, i, a) ? 1 : 0;
   return fixed;
 }
 
-RotationWarp made_warp(const Model& model, WarpSolve solve, const Context& context) {
+RotationWarp made_warp(const model::Model& model, WarpSolve solve, const Context& context) {
   if (model.tetrahedra.empty())
     throw Error("the model has no tetrahedra, expected a solid for rotation=warp");
-  const TetMesh mesh = element_mesh(model);
-  const std::vector<SolidElement> elements =
-      solid_elements(mesh, element_materials(model), context);
+  const tetrahedra::TetMesh mesh = fem::element_mesh(model);
+  const std::vector<fem::SolidElement> elements =
+      fem::solid_elements(mesh, fem::element_materials(model), context);
   std::vector<std::uint8_t> used(model.nodes.size());
   for (const auto& corners : mesh.tetrahedra)
     for (const std::uint32_t node : corners)
@@ -50,24 +50,25 @@ RotationWarp made_warp(const Model& model, WarpSolve solve, const Context& conte
 } // namespace
 
 struct WarpedStatics::State {
-  const Model& model;
-  Compliance compliance;
+  const model::Model& model;
+  compliance::Compliance compliance;
   RotationWarp warp;
   std::vector<std::uint8_t> fixed;
   std::size_t surface_nodes;
   WarpColumns columns;
   std::optional<WarpWholeLoad> whole;
-  Load whole_of; // what that is of
+  contact::Load whole_of; // what that is of
   std::shared_ptr<const WarpedAnswer> answer;
   WarpedCounts counts;
   // Displacements of the answer, once they were read.
   std::vector<double> surface, all, local;
 
-  State(const Model& m, std::shared_ptr<ComplianceSource> source, const Context& context)
+  State(const model::Model& m, std::shared_ptr<compliance::ComplianceSource> source,
+        const Context& context)
       : model(m), compliance(m, std::move(source), context, false),
         warp(made_warp(
             m, [this](std::span<double> f) { compliance.solve(f); }, context)),
-        fixed(fixed_axes(m)), surface_nodes(surface_count(m)),
+        fixed(fixed_axes(m)), surface_nodes(model::surface_count(m)),
         columns(warp.surface().nodes().size()) {}
 
   std::uint32_t place_of(std::uint32_t node) const {
@@ -82,8 +83,9 @@ struct WarpedStatics::State {
   // ---- what acts
 
   /// What is solved for: weight, and forces where they are many or inside.
-  Load whole_part(const Load& load, std::span<const std::uint32_t> touched) const {
-    Load part;
+  contact::Load whole_part(const contact::Load& load,
+                           std::span<const std::uint32_t> touched) const {
+    contact::Load part;
     part.gravity = load.gravity;
     part.force = load.force;
     for (const std::uint32_t node : touched)
@@ -95,7 +97,7 @@ struct WarpedStatics::State {
     return part;
   }
 
-  static bool same(const Load& a, const Load& b) {
+  static bool same(const contact::Load& a, const contact::Load& b) {
     return a.gravity == b.gravity && a.force == b.force;
   }
 
@@ -104,10 +106,10 @@ struct WarpedStatics::State {
     const std::size_t rows = 3 * nodes.size();
     std::vector<double> u;
     for (int a = 0; a < 3; ++a) {
-      NodeVector unit{nodes[place], {}};
+      contact::NodeVector unit{nodes[place], {}};
       unit.value[a] = 1;
       u.assign(compliance.rows(), 0);
-      if (!is_fixed(model, nodes[place], a))
+      if (!contact::is_fixed(model, nodes[place], a))
         compliance.add({&unit, 1}, 0, u);
       for (std::size_t k = 0; k < rows; ++k)
         of_node[static_cast<std::size_t>(a) * rows + k] = u[3 * std::size_t{nodes[k / 3]} + k % 3];
@@ -120,7 +122,8 @@ struct WarpedStatics::State {
   };
 
   /// Columns of the nodes that forces come by.
-  void take_columns(const Load& load, const Load& part, std::span<const std::uint32_t> touched) {
+  void take_columns(const contact::Load& load, const contact::Load& part,
+                    std::span<const std::uint32_t> touched) {
     std::vector<std::uint32_t> nodes, places;
     for (const auto& entry : load.force)
       if (!part.force.contains(entry.first))
@@ -147,7 +150,7 @@ struct WarpedStatics::State {
                 [&](std::uint32_t place, std::span<double> of_node) { column_of(place, of_node); });
   }
 
-  Acting acting_on_columns(const Load& load, const Load& part) const {
+  Acting acting_on_columns(const contact::Load& load, const contact::Load& part) const {
     Acting acting{std::vector<double>(columns.count()), std::vector<double>(columns.count()),
                   std::vector<std::uint8_t>(columns.nodes().size())};
     for (std::size_t n = 0; n < columns.nodes().size(); ++n) {
@@ -176,22 +179,22 @@ struct WarpedStatics::State {
 
   // ---- answers
 
-  void take_whole(const Load& part) {
+  void take_whole(const contact::Load& part) {
     if (part.gravity == Vec3{} && part.force.empty()) {
       whole.reset();
     } else if (!whole || !same(part, whole_of)) {
-      whole = warp.whole_load(forces_over_axes(model, part));
+      whole = warp.whole_load(compliance::forces_over_axes(model, part));
       whole_of = part;
     }
   }
 
-  void update(const Load& load, std::span<const std::uint32_t> touched) {
+  void update(const contact::Load& load, std::span<const std::uint32_t> touched) {
     const bool known = answer && answer->load == load;
     ++counts.updates;
     counts.unchanged += known ? 1 : 0;
     if (known && touched.empty())
       return;
-    const Load part = whole_part(load, touched);
+    const contact::Load part = whole_part(load, touched);
     take_columns(load, part, touched);
     if (known)
       return;
@@ -274,13 +277,14 @@ struct WarpedStatics::State {
   }
 };
 
-WarpedStatics::WarpedStatics(const Model& model, std::shared_ptr<ComplianceSource> source,
+WarpedStatics::WarpedStatics(const model::Model& model,
+                             std::shared_ptr<compliance::ComplianceSource> source,
                              const Context& context)
     : state_(std::make_unique<State>(model, std::move(source), context)) {}
 WarpedStatics::~WarpedStatics() = default;
 WarpedStatics::WarpedStatics(WarpedStatics&&) noexcept = default;
 
-void WarpedStatics::update(const Load& load, std::span<const std::uint32_t> touched) {
+void WarpedStatics::update(const contact::Load& load, std::span<const std::uint32_t> touched) {
   state_->update(load, touched);
 }
 
@@ -305,8 +309,8 @@ std::span<const double> WarpedStatics::local_displacement() {
   return state_->everywhere_local();
 }
 
-std::vector<NodeVector> WarpedStatics::holding_forces() const {
-  std::vector<NodeVector> forces;
+std::vector<contact::NodeVector> WarpedStatics::holding_forces() const {
+  std::vector<contact::NodeVector> forces;
   if (!state_->answer)
     return forces;
   const WarpState& state = state_->answer->state;
@@ -315,9 +319,9 @@ std::vector<NodeVector> WarpedStatics::holding_forces() const {
     const std::uint32_t node = entry.first;
     const auto at = std::ranges::find(state.nodes, state_->warp.surface().place()[node]);
     const auto n = static_cast<std::size_t>(at - state.nodes.begin());
-    NodeVector force{nodes[*at], {}};
+    contact::NodeVector force{nodes[*at], {}};
     for (int a = 0; a < 3; ++a)
-      if (!is_fixed(state_->model, node, a))
+      if (!contact::is_fixed(state_->model, node, a))
         force.value[a] = state.holding[3 * n + static_cast<std::size_t>(a)];
     forces.push_back(force);
   }
@@ -342,4 +346,4 @@ WarpedCounts WarpedStatics::counts() const noexcept {
   return counts;
 }
 
-} // namespace gewebe
+} // namespace gewebe::statics

@@ -18,17 +18,19 @@
 #include <span>
 #include <vector>
 
-namespace gewebe {
-
+namespace gewebe::compliance {
 class ComplianceSource;
+} // namespace gewebe::compliance
+
+namespace gewebe::statics {
 
 /// Stopping criterion: largest change by an iteration, over the largest displacement.
 inline constexpr double warp_tolerance = 1e-3;
 
 /// Solution for a load, and start of the next iteration.
 struct WarpedAnswer {
-  Load load;
-  Load whole; ///< the part of `load` that is solved for, not applied by columns
+  contact::Load load;
+  contact::Load whole; ///< the part of `load` that is solved for, not applied by columns
   WarpState state;
 };
 
@@ -48,7 +50,7 @@ public:
   /// \pre check_model(model) passes; the source belongs to the model
   /// \throw Error if the model has no tetrahedra, or a node that belongs to none; as RotationStrain
   /// and the factor
-  WarpedStatics(const Model& model, std::shared_ptr<ComplianceSource> source,
+  WarpedStatics(const model::Model& model, std::shared_ptr<compliance::ComplianceSource> source,
                 const Context& context);
   ~WarpedStatics();
   WarpedStatics(WarpedStatics&&) noexcept;
@@ -57,7 +59,7 @@ public:
   /// \param touched  further nodes whose columns apply forces, ascending
   /// \throw Error if a displaced or touched node is inside, there are more than 1,000 of them,
   /// columns can't be read, or the answer isn't finite
-  void update(const Load& load, std::span<const std::uint32_t> touched = {});
+  void update(const contact::Load& load, std::span<const std::uint32_t> touched = {});
   std::shared_ptr<const WarpedAnswer> answer() const noexcept;
   /// Rolls back to an earlier answer; null: to none.
   void restore(std::shared_ptr<const WarpedAnswer> answer);
@@ -71,7 +73,7 @@ public:
   /// with it.
   std::span<const double> local_displacement();
   /// Reactions of the displaced nodes, by ascending node.
-  std::vector<NodeVector> holding_forces() const;
+  std::vector<contact::NodeVector> holding_forces() const;
 
   /// Compliance of the nodes near the last answer, the Delassus operator: 3 m × 3 m.
   /// \pre the nodes were among `touched` of the last update
@@ -84,4 +86,4 @@ private:
   std::unique_ptr<State> state_;
 };
 
-} // namespace gewebe
+} // namespace gewebe::statics

@@ -7,7 +7,7 @@
 #include <cmath>
 #include <utility>
 
-namespace gewebe {
+namespace gewebe::stuffing {
 namespace {
 
 Int3 doubled(const Int3& place) {
@@ -165,4 +165,4 @@ double least_cut(const Background::Node& node, const Int3& step) {
   return edge * (node.centre ? refined_alpha_centre : refined_alpha_corner)[axes - 1];
 }
 
-} // namespace gewebe
+} // namespace gewebe::stuffing

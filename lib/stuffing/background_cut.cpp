@@ -8,7 +8,7 @@
 #include <cmath>
 #include <utility>
 
-namespace gewebe {
+namespace gewebe::stuffing {
 namespace {
 
 constexpr std::uint32_t none = BackgroundSurface::none;
@@ -36,7 +36,7 @@ public:
          const BackgroundSurface& surface)
       : lattice_(lattice), background_(background), surface_(surface), levels_(levels) {}
 
-  TetMesh cut(StuffingReport& report) {
+  tetrahedra::TetMesh cut(StuffingReport& report) {
     number(report);
     place(report);
     for (const Tetrahedron& t : background_.tetrahedra)
@@ -176,14 +176,15 @@ private:
   const BackgroundSurface& surface_;
   unsigned levels_;
   Numbers numbers_;
-  TetMesh mesh_;
+  tetrahedra::TetMesh mesh_;
 };
 
 } // namespace
 
-TetMesh cut_background(const StuffingLattice& lattice, const Background& background,
-                       unsigned levels, const BackgroundSurface& surface, StuffingReport& report) {
+tetrahedra::TetMesh cut_background(const StuffingLattice& lattice, const Background& background,
+                                   unsigned levels, const BackgroundSurface& surface,
+                                   StuffingReport& report) {
   return Cutter(lattice, background, levels, surface).cut(report);
 }
 
-} // namespace gewebe
+} // namespace gewebe::stuffing

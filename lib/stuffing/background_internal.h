@@ -17,7 +17,7 @@
 #include <span>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::stuffing {
 
 /// Conforming tetrahedra of positive volume round the edge between the centres of two leaves with a
 /// common face (Labelle and Shewchuk 2007, section 3). In units of the smaller leaf's edge they are
@@ -87,17 +87,18 @@ Meeting meeting(const Background& background, const BackgroundSurface& surface,
 Vec3 background_place(const Background::Node& node, unsigned levels);
 
 /// Which nodes are inside. \throw Error if a value is not finite
-std::vector<bool> inside_nodes(const Context& context, const Grid& grid,
+std::vector<bool> inside_nodes(const Context& context, const volume::Grid& grid,
                                const StuffingLattice& lattice, const Background& background,
                                unsigned levels);
 
 /// Finds the cuts and warps nodes as in warp_internal.h, one after the other by number.
-BackgroundSurface warp_background(const Context& context, const Grid& grid,
+BackgroundSurface warp_background(const Context& context, const volume::Grid& grid,
                                   const StuffingLattice& lattice, const Background& background,
                                   unsigned levels, std::vector<bool> inside);
 
 /// The part inside. Fills in the report's counts.
-TetMesh cut_background(const StuffingLattice& lattice, const Background& background,
-                       unsigned levels, const BackgroundSurface& surface, StuffingReport& report);
+tetrahedra::TetMesh cut_background(const StuffingLattice& lattice, const Background& background,
+                                   unsigned levels, const BackgroundSurface& surface,
+                                   StuffingReport& report);
 
-} // namespace gewebe
+} // namespace gewebe::stuffing

@@ -10,7 +10,7 @@
 #include <cmath>
 #include <utility>
 
-namespace gewebe {
+namespace gewebe::stuffing {
 namespace {
 
 constexpr std::size_t grain = 4096;
@@ -29,7 +29,7 @@ std::vector<BackgroundSurface::Edge> edges_to_outside(const Background& backgrou
                                                       const std::vector<bool>& inside) {
   std::vector<std::pair<std::uint32_t, std::uint32_t>> ends;
   for (const Tetrahedron& t : background.tetrahedra)
-    for (const auto& [i, j] : tetrahedron_edges)
+    for (const auto& [i, j] : tetrahedra::tetrahedron_edges)
       if (inside[t[i]] != inside[t[j]])
         ends.push_back(inside[t[i]] ? std::pair(t[i], t[j]) : std::pair(t[j], t[i]));
   std::ranges::sort(ends);
@@ -185,7 +185,7 @@ Vec3 background_place(const Background::Node& node, unsigned levels) {
          std::ldexp(0.5, -static_cast<int>(levels));
 }
 
-std::vector<bool> inside_nodes(const Context& context, const Grid& grid,
+std::vector<bool> inside_nodes(const Context& context, const volume::Grid& grid,
                                const StuffingLattice& lattice, const Background& background,
                                unsigned levels) {
   std::vector<std::uint8_t> inside(background.nodes.size());
@@ -196,15 +196,15 @@ std::vector<bool> inside_nodes(const Context& context, const Grid& grid,
       const double excess = finder.excess(index);
       if (!std::isfinite(excess))
         throw Error("the volume has a value that is not finite near voxel (" +
-                    number_text(index.x) + ", " + number_text(index.y) + ", " +
-                    number_text(index.z) + ")");
+                    text::number_text(index.x) + ", " + text::number_text(index.y) + ", " +
+                    text::number_text(index.z) + ")");
       inside[n] = excess > 0 ? 1 : 0;
     }
   });
   return {inside.begin(), inside.end()};
 }
 
-BackgroundSurface warp_background(const Context& context, const Grid& grid,
+BackgroundSurface warp_background(const Context& context, const volume::Grid& grid,
                                   const StuffingLattice& lattice, const Background& background,
                                   unsigned levels, std::vector<bool> inside) {
   BackgroundSurface surface;
@@ -230,4 +230,4 @@ BackgroundSurface warp_background(const Context& context, const Grid& grid,
   return surface;
 }
 
-} // namespace gewebe
+} // namespace gewebe::stuffing

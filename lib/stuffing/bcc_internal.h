@@ -10,7 +10,7 @@
 #include <cstddef>
 #include <cstdint>
 
-namespace gewebe::bcc {
+namespace gewebe::stuffing::bcc {
 
 inline constexpr unsigned directions = 14;
 /// Directions 0 … 5 are -x +x -y +y -z +z; 6 + o is (±½, ±½, ±½), with a + along axis a where bit a
@@ -183,4 +183,4 @@ constexpr Link make_link() {
 }
 inline constexpr Link link = make_link();
 
-} // namespace gewebe::bcc
+} // namespace gewebe::stuffing::bcc

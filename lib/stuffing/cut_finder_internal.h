@@ -7,12 +7,12 @@
 
 #include <cmath>
 
-namespace gewebe {
+namespace gewebe::stuffing {
 
 /// Roots of value - isovalue along segments of the grid's index space; for one thread.
 class CutFinder {
 public:
-  CutFinder(const Grid& grid, const StuffingLattice& lattice)
+  CutFinder(const volume::Grid& grid, const StuffingLattice& lattice)
       : field_(grid), isovalue_(lattice.isovalue), sign_(lattice.below ? -1 : 1) {}
 
   /// Above 0 inside.
@@ -50,8 +50,8 @@ public:
   }
 
 private:
-  Field field_;
+  volume::Field field_;
   double isovalue_, sign_;
 };
 
-} // namespace gewebe
+} // namespace gewebe::stuffing

@@ -2,7 +2,7 @@
 
 #include <utility>
 
-namespace gewebe {
+namespace gewebe::stuffing {
 
 BlockCutter::BlockCutter(const StuffingParts& parts) : parts_(parts) {
   for (unsigned n = 0; n < bcc::cell_points; ++n) {
@@ -17,9 +17,9 @@ void BlockCutter::gather(std::size_t block, BlockPoints& points) const {
   const StuffingNodes& nodes = parts_.nodes;
   unsigned n = 0;
   for (unsigned kind = 0; kind < 2; ++kind)
-    for (int i = 0; i <= leaf_dim; ++i)
-      for (int j = 0; j <= leaf_dim; ++j)
-        for (int k = 0; k <= leaf_dim; ++k, ++n) {
+    for (int i = 0; i <= volume::leaf_dim; ++i)
+      for (int j = 0; j <= volume::leaf_dim; ++j)
+        for (int k = 0; k <= volume::leaf_dim; ++k, ++n) {
           const PlaceInBlock place = locate(parts_.blocks[block], kind, {i, j, k});
           points.sign[n] = -1;
           if (place.block == StuffingBlock::none)
@@ -119,4 +119,4 @@ BlockCutter::Found BlockCutter::find(const StuffingBlock& block, const bcc::Poin
           parts_.nodes.first_inner[place.block] + inner.rank(place.word, place.bit)};
 }
 
-} // namespace gewebe
+} // namespace gewebe::stuffing

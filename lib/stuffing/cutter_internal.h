@@ -15,7 +15,7 @@
 #include <cstdint>
 #include <optional>
 
-namespace gewebe {
+namespace gewebe::stuffing {
 
 /// All that a mesh is made of.
 struct StuffingParts {
@@ -31,7 +31,7 @@ struct StuffingParts {
 
 /// The points of a block's cells, those on its far sides included.
 struct BlockPoints {
-  static constexpr unsigned dim = leaf_dim + 1, count = 2 * dim * dim * dim;
+  static constexpr unsigned dim = volume::leaf_dim + 1, count = 2 * dim * dim * dim;
   static constexpr unsigned at(unsigned kind, unsigned i, unsigned j, unsigned k) {
     return ((kind * dim + i) * dim + j) * dim + k;
   }
@@ -71,9 +71,9 @@ public:
   void for_each(std::size_t b, const BlockPoints& points, Cut&& cut, Whole&& whole) const {
     const StuffingBlock& block = parts_.blocks[b];
     const bool fine = parts_.grading.none() || parts_.grading.is_fine(block);
-    for (unsigned i = 0; i < leaf_dim; ++i)
-      for (unsigned j = 0; j < leaf_dim; ++j)
-        for (unsigned k = 0; k < leaf_dim; ++k) {
+    for (unsigned i = 0; i < volume::leaf_dim; ++i)
+      for (unsigned j = 0; j < volume::leaf_dim; ++j)
+        for (unsigned k = 0; k < volume::leaf_dim; ++k) {
           const unsigned base = BlockPoints::at(0, i, j, k);
           int inside = 0;
           for (const unsigned offset : offset_)
@@ -163,4 +163,4 @@ private:
   std::array<unsigned, bcc::cell_points> offset_{};
 };
 
-} // namespace gewebe
+} // namespace gewebe::stuffing

@@ -5,7 +5,7 @@
 // Based on: Labelle and Shewchuk, Isosurface Stuffing: Fast Tetrahedral Meshes with Good Dihedral
 // Angles, 2007, section 3.
 
-namespace gewebe {
+namespace gewebe::stuffing {
 namespace {
 
 /// Cells that may be part of a larger leaf: nothing of their own, and of the tetrahedra that they
@@ -18,7 +18,7 @@ CellSet quiet_cells(const StuffingBlocks& blocks, const StuffingBlock& block) {
     return there.surface.set()[word] | there.interface.set()[word];
   };
   CellSet quiet{};
-  for (int i = 0; i < leaf_dim; ++i) {
+  for (int i = 0; i < volume::leaf_dim; ++i) {
     const auto centres = static_cast<unsigned>(8 + i);
     std::uint64_t loud = ~block.inside[centres];
     for (unsigned d = 0; d < bcc::directions; ++d)
@@ -79,7 +79,7 @@ Grading grade_blocks(const Context& context, const StuffingBlocks& blocks, unsig
     return grading;
   grading.blocks.resize(blocks.size());
   const auto each = [&](auto&& body) {
-    parallel_blocks(context, blocks.size(), 32, [&](std::size_t begin, std::size_t end) {
+    gewebe::parallel_blocks(context, blocks.size(), 32, [&](std::size_t begin, std::size_t end) {
       for (std::size_t n = begin; n < end; ++n)
         body(blocks[n], grading.blocks[n]);
     });
@@ -118,9 +118,9 @@ Grading grade_blocks(const Context& context, const StuffingBlocks& blocks, unsig
 
 PointSet leaf_points(const Grading& grading, const StuffingBlock& block) {
   PointSet points{};
-  for (int i = 0; i < leaf_dim; ++i)
-    for (int j = 0; j < leaf_dim; ++j)
-      for (int k = 0; k < leaf_dim; ++k) {
+  for (int i = 0; i < volume::leaf_dim; ++i)
+    for (int j = 0; j < volume::leaf_dim; ++j)
+      for (int k = 0; k < volume::leaf_dim; ++k) {
         const auto bit = static_cast<unsigned>(8 * j + k);
         if (grading.level(block, {i, j, k}) == 0)
           points[static_cast<std::size_t>(8 + i)] |= std::uint64_t{1} << bit;
@@ -137,4 +137,4 @@ PointSet leaf_points(const Grading& grading, const StuffingBlock& block) {
   return points;
 }
 
-} // namespace gewebe
+} // namespace gewebe::stuffing

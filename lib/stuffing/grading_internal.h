@@ -9,7 +9,7 @@
 #include <cstdint>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::stuffing {
 
 /// A block has cubes of 1, 2, 4, 8 cells.
 inline constexpr unsigned largest_level = 3;
@@ -163,4 +163,4 @@ void for_each_between(const Grading& grading, const StuffingBlock& block, const 
   }
 }
 
-} // namespace gewebe
+} // namespace gewebe::stuffing

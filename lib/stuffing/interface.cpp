@@ -5,7 +5,7 @@
 
 #include <algorithm>
 
-namespace gewebe {
+namespace gewebe::stuffing {
 namespace {
 
 constexpr std::size_t grain = 1024;
@@ -250,4 +250,4 @@ MaterialInterface follow_interface(const Context& context, const StuffingLattice
   return interface;
 }
 
-} // namespace gewebe
+} // namespace gewebe::stuffing

@@ -12,7 +12,7 @@
 #include <cstdint>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::stuffing {
 
 /// By block, word and bit: the material of points inside. Nothing for blocks without any.
 using BlockMaterials = std::vector<std::vector<std::int32_t>>;
@@ -72,4 +72,4 @@ MaterialInterface follow_interface(const Context& context, const StuffingLattice
                                    const StuffingBlocks& blocks, const SurfacePoints& surface,
                                    const BlockMaterials& materials, const MaterialSource& source);
 
-} // namespace gewebe
+} // namespace gewebe::stuffing

@@ -9,13 +9,13 @@
 #include <cmath>
 #include <string>
 
-namespace gewebe {
+namespace gewebe::stuffing {
 namespace {
 
 constexpr double index_limit = 1 << 30;
 
-GridTransform scaled(const GridTransform& transform, double factor) {
-  GridTransform result = transform;
+volume::GridTransform scaled(const volume::GridTransform& transform, double factor) {
+  volume::GridTransform result = transform;
   for (std::size_t row = 0; row < 3; ++row)
     for (std::size_t column = 0; column < 3; ++column)
       result.m[4 * row + column] *= factor;
@@ -23,8 +23,9 @@ GridTransform scaled(const GridTransform& transform, double factor) {
 }
 
 /// first, then second.
-GridTransform after(const GridTransform& second, const GridTransform& first) {
-  GridTransform result;
+volume::GridTransform after(const volume::GridTransform& second,
+                            const volume::GridTransform& first) {
+  volume::GridTransform result;
   const Vec3 origin = second.to_index(first.to_world({0, 0, 0}));
   for (int column = 0; column < 3; ++column) {
     Vec3 unit;
@@ -48,7 +49,7 @@ struct BlockRange {
     return product;
   }
 };
-BlockRange block_range(const GridTransform& to_place, const Int3& origin, int dim) {
+BlockRange block_range(const volume::GridTransform& to_place, const Int3& origin, int dim) {
   // Voxel centres of the cube, and all that interpolation takes from them.
   const Vec3 low{origin[0] - 1.0, origin[1] - 1.0, origin[2] - 1.0};
   const double edge = dim + 1.0;
@@ -59,9 +60,9 @@ BlockRange block_range(const GridTransform& to_place, const Int3& origin, int di
                                low.z + ((corner & 4) != 0 ? edge : 0)}));
   BlockRange range;
   for (std::size_t a = 0; a < 3; ++a) {
-    const double from = std::floor((box.min[static_cast<int>(a)] - 1) / leaf_dim),
-                 to = std::floor((box.max[static_cast<int>(a)] + 1) / leaf_dim);
-    if (!(from > -index_limit / leaf_dim) || !(to < index_limit / leaf_dim))
+    const double from = std::floor((box.min[static_cast<int>(a)] - 1) / volume::leaf_dim),
+                 to = std::floor((box.max[static_cast<int>(a)] + 1) / volume::leaf_dim);
+    if (!(from > -index_limit / volume::leaf_dim) || !(to < index_limit / volume::leaf_dim))
       throw Error("the volume has cells beyond index 2^30 of the lattice, expected a larger --cell "
                   "or a volume nearer to its origin");
     range.min[a] = static_cast<std::int64_t>(from);
@@ -71,7 +72,8 @@ BlockRange block_range(const GridTransform& to_place, const Int3& origin, int di
 }
 
 std::string place_text(const Vec3& index) {
-  return number_text(index.x) + ", " + number_text(index.y) + ", " + number_text(index.z);
+  return text::number_text(index.x) + ", " + text::number_text(index.y) + ", " +
+         text::number_text(index.z);
 }
 
 bool is_inside(const StuffingLattice& lattice, double value) {
@@ -79,22 +81,24 @@ bool is_inside(const StuffingLattice& lattice, double value) {
 }
 
 /// Origins of the blocks that may hold a point inside, by (i, j, k).
-std::vector<Int3> candidates(const Context& context, const Grid& grid,
+std::vector<Int3> candidates(const Context& context, const volume::Grid& grid,
                              const StuffingLattice& lattice) {
-  const GridTransform to_place = after(lattice.to_index, GridTransform{}); // of index space
-  const std::vector<LeafView> leaves = grid.leaves();
+  const volume::GridTransform to_place =
+      after(lattice.to_index, volume::GridTransform{}); // of index space
+  const std::vector<volume::LeafView> leaves = grid.leaves();
   std::vector<std::uint8_t> wanted(leaves.size());
   parallel_blocks(context, leaves.size(), 256, [&](std::size_t begin, std::size_t end) {
     for (std::size_t n = begin; n < end; ++n)
-      wanted[n] = std::any_of(leaves[n].values, leaves[n].values + leaf_voxels, [&](float value) {
-        return !std::isfinite(value) || is_inside(lattice, static_cast<double>(value));
-      });
+      wanted[n] =
+          std::any_of(leaves[n].values, leaves[n].values + volume::leaf_voxels, [&](float value) {
+            return !std::isfinite(value) || is_inside(lattice, static_cast<double>(value));
+          });
   });
   std::vector<BlockRange> ranges;
   for (std::size_t n = 0; n < leaves.size(); ++n)
     if (wanted[n] != 0)
-      ranges.push_back(block_range(to_place, leaves[n].origin, leaf_dim));
-  for (const TileView& tile : grid.tiles())
+      ranges.push_back(block_range(to_place, leaves[n].origin, volume::leaf_dim));
+  for (const volume::TileView& tile : grid.tiles())
     if (!std::isfinite(tile.value) || is_inside(lattice, static_cast<double>(tile.value)))
       ranges.push_back(block_range(to_place, tile.origin, tile.dim));
   double count = 0;
@@ -102,7 +106,7 @@ std::vector<Int3> candidates(const Context& context, const Grid& grid,
     count += range.count();
   require_memory(context, count * sizeof(Int3), "the blocks of the lattice");
   if (!(count < 1e9))
-    throw Error("the lattice would have over " + number_text(count * 512) +
+    throw Error("the lattice would have over " + text::number_text(count * 512) +
                 " cells, expected a larger --cell");
   std::vector<Int3> origins;
   origins.reserve(static_cast<std::size_t>(count));
@@ -110,31 +114,33 @@ std::vector<Int3> candidates(const Context& context, const Grid& grid,
     for (std::int64_t i = range.min[0]; i <= range.max[0]; ++i)
       for (std::int64_t j = range.min[1]; j <= range.max[1]; ++j)
         for (std::int64_t k = range.min[2]; k <= range.max[2]; ++k)
-          origins.push_back({static_cast<std::int32_t>(i * leaf_dim),
-                             static_cast<std::int32_t>(j * leaf_dim),
-                             static_cast<std::int32_t>(k * leaf_dim)});
+          origins.push_back({static_cast<std::int32_t>(i * volume::leaf_dim),
+                             static_cast<std::int32_t>(j * volume::leaf_dim),
+                             static_cast<std::int32_t>(k * volume::leaf_dim)});
   std::sort(origins.begin(), origins.end());
   origins.erase(std::unique(origins.begin(), origins.end()), origins.end());
   return origins;
 }
 
 /// The value of all of a block's surroundings where they are one tile or the background.
-bool is_constant(const StuffingLattice& lattice, GridAccessor& values, const Int3& origin,
+bool is_constant(const StuffingLattice& lattice, volume::GridAccessor& values, const Int3& origin,
                  float& value) {
   Box3 box;
   for (int corner = 0; corner < 8; ++corner)
-    box.add(lattice.to_index.to_world({origin[0] + ((corner & 1) != 0 ? leaf_dim + 0.5 : -0.5),
-                                       origin[1] + ((corner & 2) != 0 ? leaf_dim + 0.5 : -0.5),
-                                       origin[2] + ((corner & 4) != 0 ? leaf_dim + 0.5 : -0.5)}));
+    box.add(lattice.to_index.to_world(
+        {origin[0] + ((corner & 1) != 0 ? volume::leaf_dim + 0.5 : -0.5),
+         origin[1] + ((corner & 2) != 0 ? volume::leaf_dim + 0.5 : -0.5),
+         origin[2] + ((corner & 4) != 0 ? volume::leaf_dim + 0.5 : -0.5)}));
   Int3 low{}, high{};
   for (std::size_t a = 0; a < 3; ++a) {
-    low[a] = static_cast<std::int32_t>(std::floor(box.min[static_cast<int>(a)])) & ~(leaf_dim - 1);
+    low[a] = static_cast<std::int32_t>(std::floor(box.min[static_cast<int>(a)])) &
+             ~(volume::leaf_dim - 1);
     high[a] = static_cast<std::int32_t>(std::floor(box.max[static_cast<int>(a)])) + 1;
   }
   bool first = true;
-  for (std::int32_t i = low[0]; i <= high[0]; i += leaf_dim)
-    for (std::int32_t j = low[1]; j <= high[1]; j += leaf_dim)
-      for (std::int32_t k = low[2]; k <= high[2]; k += leaf_dim) {
+  for (std::int32_t i = low[0]; i <= high[0]; i += volume::leaf_dim)
+    for (std::int32_t j = low[1]; j <= high[1]; j += volume::leaf_dim)
+      for (std::int32_t k = low[2]; k <= high[2]; k += volume::leaf_dim) {
         float here = 0;
         if (values.leaf_at({i, j, k}, here).values != nullptr)
           return false;
@@ -146,7 +152,7 @@ bool is_constant(const StuffingLattice& lattice, GridAccessor& values, const Int
   return true;
 }
 
-void sample(const StuffingLattice& lattice, GridAccessor& values, Field& field,
+void sample(const StuffingLattice& lattice, volume::GridAccessor& values, volume::Field& field,
             StuffingBlock& block) {
   float constant = 0;
   if (is_constant(lattice, values, block.origin, constant) && std::isfinite(constant)) {
@@ -175,9 +181,9 @@ void link_blocks(StuffingBlocks& blocks) {
     for (int x = -1; x <= 1; ++x)
       for (int y = -1; y <= 1; ++y)
         for (int z = -1; z <= 1; ++z)
-          block.neighbours[static_cast<std::size_t>(9 * x + 3 * y + z + 13)] =
-              numbers.find({block.origin[0] + leaf_dim * x, block.origin[1] + leaf_dim * y,
-                            block.origin[2] + leaf_dim * z});
+          block.neighbours[static_cast<std::size_t>(9 * x + 3 * y + z + 13)] = numbers.find(
+              {block.origin[0] + volume::leaf_dim * x, block.origin[1] + volume::leaf_dim * y,
+               block.origin[2] + volume::leaf_dim * z});
 }
 
 void find_surface(const StuffingBlocks& blocks, StuffingBlock& block) {
@@ -199,9 +205,9 @@ void find_surface(const StuffingBlocks& blocks, StuffingBlock& block) {
 
 } // namespace
 
-StuffingLattice stuffing_lattice(const Grid& grid, std::optional<double> isovalue,
+StuffingLattice stuffing_lattice(const volume::Grid& grid, std::optional<double> isovalue,
                                  std::optional<double> cell) {
-  const GridInfo& info = grid.info();
+  const volume::GridInfo& info = grid.info();
   StuffingLattice lattice;
   lattice.isovalue = isovalue.value_or(info.level_set ? 0 : info.isovalue);
   lattice.below = info.level_set;
@@ -211,8 +217,9 @@ StuffingLattice stuffing_lattice(const Grid& grid, std::optional<double> isovalu
   if (!std::isfinite(determinant) || determinant == 0)
     throw Error("the volume's transform is singular, expected an invertible affine map");
   if (info.band_isovalue && *info.band_isovalue != lattice.isovalue)
-    throw Error("the volume is exact only near isovalue " + number_text(*info.band_isovalue) +
-                " (made with --band), expected that one, not " + number_text(lattice.isovalue));
+    throw Error("the volume is exact only near isovalue " + text::number_text(*info.band_isovalue) +
+                " (made with --band), expected that one, not " +
+                text::number_text(lattice.isovalue));
   if (is_inside(lattice, static_cast<double>(info.background)))
     throw Error("the volume's background is inside, so that nothing bounds the solid, expected it "
                 "outside");
@@ -220,19 +227,19 @@ StuffingLattice stuffing_lattice(const Grid& grid, std::optional<double> isovalu
   const double voxel = cubic ? info.transform.voxel_size().x : std::cbrt(std::fabs(determinant));
   lattice.cell = cell.value_or(voxel);
   if (!std::isfinite(lattice.cell) || !(lattice.cell > 0))
-    throw Error("a cell of " + number_text(lattice.cell) + " mm, expected more than 0");
+    throw Error("a cell of " + text::number_text(lattice.cell) + " mm, expected more than 0");
   if (cubic) {
     const double factor = lattice.cell / voxel;
     lattice.to_world = scaled(info.transform, factor);
-    lattice.to_index = scaled(GridTransform{}, factor);
+    lattice.to_index = scaled(volume::GridTransform{}, factor);
   } else {
-    lattice.to_world = uniform_transform(lattice.cell);
+    lattice.to_world = volume::uniform_transform(lattice.cell);
     lattice.to_index = after(info.transform, lattice.to_world);
   }
   return lattice;
 }
 
-StuffingBlocks stuffing_blocks(const Context& context, const Grid& grid,
+StuffingBlocks stuffing_blocks(const Context& context, const volume::Grid& grid,
                                const StuffingLattice& lattice,
                                const std::function<bool(const Int3&)>& keep) {
   Context quiet = context;
@@ -242,8 +249,8 @@ StuffingBlocks stuffing_blocks(const Context& context, const Grid& grid,
                  "the blocks of the lattice");
   StuffingBlocks sampled(origins.size());
   parallel_blocks(quiet, origins.size(), 8, [&](std::size_t begin, std::size_t end) {
-    GridAccessor values(grid);
-    Field field(grid);
+    volume::GridAccessor values(grid);
+    volume::Field field(grid);
     for (std::size_t n = begin; n < end; ++n) {
       sampled[n].origin = origins[n];
       sample(lattice, values, field, sampled[n]);
@@ -256,8 +263,9 @@ StuffingBlocks stuffing_blocks(const Context& context, const Grid& grid,
       for (int x = -1; x <= 1; ++x)
         for (int y = -1; y <= 1; ++y)
           for (int z = -1; z <= 1; ++z)
-            kept.push_back({block.origin[0] + leaf_dim * x, block.origin[1] + leaf_dim * y,
-                            block.origin[2] + leaf_dim * z});
+            kept.push_back({block.origin[0] + volume::leaf_dim * x,
+                            block.origin[1] + volume::leaf_dim * y,
+                            block.origin[2] + volume::leaf_dim * z});
   std::sort(kept.begin(), kept.end());
   kept.erase(std::unique(kept.begin(), kept.end()), kept.end());
   StuffingBlocks blocks(kept.size());
@@ -283,4 +291,4 @@ StuffingBlocks stuffing_blocks(const Context& context, const Grid& grid,
   return blocks;
 }
 
-} // namespace gewebe
+} // namespace gewebe::stuffing

@@ -15,19 +15,20 @@
 #include <optional>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::stuffing {
 
 /// Where lattice points lie, and what is inside.
 struct StuffingLattice {
-  GridTransform to_world; ///< of places of the lattice; its columns are orthogonal and equally long
-  GridTransform to_index; ///< of places of the lattice to the grid's index space
-  double cell = 0;        ///< mm
+  volume::GridTransform
+      to_world; ///< of places of the lattice; its columns are orthogonal and equally long
+  volume::GridTransform to_index; ///< of places of the lattice to the grid's index space
+  double cell = 0;                ///< mm
   double isovalue = 0;
   bool below = false; ///< inside is value < isovalue
 };
 
 /// \throw Error as stuff() for transform, isovalue, background and cell
-StuffingLattice stuffing_lattice(const Grid& grid, std::optional<double> isovalue,
+StuffingLattice stuffing_lattice(const volume::Grid& grid, std::optional<double> isovalue,
                                  std::optional<double> cell);
 
 /// A set of the points of a block: word i of the corners, then of the centres, bit 8 j + k.
@@ -132,7 +133,7 @@ std::uint64_t shifted_word(const StuffingBlocks& blocks, const StuffingBlock& bl
                            int i, const Int3& step, WordOf&& word_of) {
   constexpr std::uint64_t column = 0x0101010101010101U;
   const int slice = i + step[0];
-  const int x = slice < 0 ? -1 : slice >= leaf_dim ? 1 : 0;
+  const int x = slice < 0 ? -1 : slice >= volume::leaf_dim ? 1 : 0;
   const auto word = [&](int y, int z) -> std::uint64_t {
     const std::uint32_t n = block.neighbours[static_cast<std::size_t>(9 * x + 3 * y + z + 13)];
     return n == StuffingBlock::none
@@ -154,8 +155,8 @@ std::uint64_t shifted_word(const StuffingBlocks& blocks, const StuffingBlock& bl
 /// point inside
 /// \throw Error if a value that is looked at is not finite; if indices come near the limits of 32
 /// bits; beyond context.max_memory
-StuffingBlocks stuffing_blocks(const Context& context, const Grid& grid,
+StuffingBlocks stuffing_blocks(const Context& context, const volume::Grid& grid,
                                const StuffingLattice& lattice,
                                const std::function<bool(const Int3&)>& keep = {});
 
-} // namespace gewebe
+} // namespace gewebe::stuffing

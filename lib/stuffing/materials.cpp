@@ -8,27 +8,27 @@
 #include <cstddef>
 #include <memory>
 
-namespace gewebe {
+namespace gewebe::stuffing {
 namespace {
 
-void check_transform(const GridTransform& transform) {
+void check_transform(const volume::GridTransform& transform) {
   const double determinant = transform.determinant();
   if (!std::isfinite(determinant) || determinant == 0)
     throw Error("the transform of a volume of materials is singular, expected an invertible map");
 }
 
-Vec3 centroid(const TetMesh& mesh, std::size_t t) {
+Vec3 centroid(const tetrahedra::TetMesh& mesh, std::size_t t) {
   const auto& [a, b, c, d] = mesh.tetrahedra[t];
   return (mesh.points[a] + mesh.points[b] + mesh.points[c] + mesh.points[d]) / 4;
 }
 
-Vec3 centre_of(const LabelRuns& labels, const Int3& v) {
+Vec3 centre_of(const labels::LabelRuns& labels, const Int3& v) {
   return labels.transform.to_world(
       {static_cast<double>(v[0]), static_cast<double>(v[1]), static_cast<double>(v[2])});
 }
 
 /// Do the centres of a voxel and its six neighbours lie in the solid? Never without one.
-bool is_within(const LabelRuns& labels, const MaterialAt& solid, const Int3& v) {
+bool is_within(const labels::LabelRuns& labels, const MaterialAt& solid, const Int3& v) {
   if (!solid || solid(centre_of(labels, v)) == 0)
     return false;
   for (std::size_t axis = 0; axis < 3; ++axis)
@@ -42,7 +42,7 @@ bool is_within(const LabelRuns& labels, const MaterialAt& solid, const Int3& v) 
 }
 
 /// As label_source says. \pre transform is invertible
-std::int32_t label_at(const LabelRuns& labels, const Vec3& place, std::int32_t reach,
+std::int32_t label_at(const labels::LabelRuns& labels, const Vec3& place, std::int32_t reach,
                       const MaterialAt& solid) {
   const Vec3 index = labels.transform.to_index(place);
   Int3 voxel{};
@@ -73,12 +73,12 @@ std::int32_t label_at(const LabelRuns& labels, const Vec3& place, std::int32_t r
 
 } // namespace
 
-MaterialSource inside_source(const Grid& volume, std::optional<double> isovalue) {
+MaterialSource inside_source(const volume::Grid& volume, std::optional<double> isovalue) {
   check_transform(volume.info().transform);
   const bool level_set = volume.info().level_set;
   const double limit = isovalue.value_or(level_set ? 0 : volume.info().isovalue);
   return [&volume, level_set, limit]() -> MaterialAt {
-    const auto field = std::make_shared<Field>(volume);
+    const auto field = std::make_shared<volume::Field>(volume);
     return [field, level_set, limit,
             transform = volume.info().transform](const Vec3& place) -> std::int32_t {
       const double value = field->value(transform.to_index(place));
@@ -89,7 +89,7 @@ MaterialSource inside_source(const Grid& volume, std::optional<double> isovalue)
   };
 }
 
-MaterialSource label_source(const LabelRuns& labels, std::int32_t reach,
+MaterialSource label_source(const labels::LabelRuns& labels, std::int32_t reach,
                             const MaterialSource& solid) {
   check_transform(labels.transform);
   return [&labels, reach, solid]() -> MaterialAt {
@@ -99,7 +99,8 @@ MaterialSource label_source(const LabelRuns& labels, std::int32_t reach,
   };
 }
 
-void set_materials(const Context& context, const MaterialSource& source, TetMesh& mesh) {
+void set_materials(const Context& context, const MaterialSource& source,
+                   tetrahedra::TetMesh& mesh) {
   mesh.material.resize(mesh.tetrahedra.size());
   parallel_blocks(context, mesh.tetrahedra.size(), 4096, [&](std::size_t begin, std::size_t end) {
     const MaterialAt material_at_place = source();
@@ -108,4 +109,4 @@ void set_materials(const Context& context, const MaterialSource& source, TetMesh
   });
 }
 
-} // namespace gewebe
+} // namespace gewebe::stuffing

@@ -3,7 +3,7 @@
 #include "base/error.h"
 #include "base/parallel.h"
 
-namespace gewebe {
+namespace gewebe::stuffing {
 namespace {
 constexpr const char* too_many = "the mesh has more than 2^32 - 2 nodes, expected a larger --cell";
 } // namespace
@@ -76,4 +76,4 @@ StuffingNodes number_nodes(const Context& context, const StuffingBlocks& blocks,
   return nodes;
 }
 
-} // namespace gewebe
+} // namespace gewebe::stuffing

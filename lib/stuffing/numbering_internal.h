@@ -12,7 +12,7 @@
 #include <cstdint>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::stuffing {
 
 /// Numbers of the mesh's nodes.
 struct StuffingNodes {
@@ -44,4 +44,4 @@ StuffingNodes number_nodes(const Context& context, const StuffingBlocks& blocks,
                            const Grading& grading, const SurfacePoints& surface,
                            const MaterialInterface& interface);
 
-} // namespace gewebe
+} // namespace gewebe::stuffing

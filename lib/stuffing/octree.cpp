@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <utility>
 
-namespace gewebe {
+namespace gewebe::stuffing {
 
 void GrowingIndexMap::insert(const Int3& key, std::uint32_t value) {
   if (keys_.size() == room_) {
@@ -94,4 +94,4 @@ std::vector<OctreeCube> StuffingOctree::leaves(unsigned block) const {
   return result;
 }
 
-} // namespace gewebe
+} // namespace gewebe::stuffing

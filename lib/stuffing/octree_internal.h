@@ -10,7 +10,7 @@
 #include <cstdint>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::stuffing {
 
 /// A cube of an octree: its edge is 1 << level of the finest cells, its first cell `cube` << level.
 struct OctreeCube {
@@ -85,4 +85,4 @@ private:
   std::vector<Level> levels_;
 };
 
-} // namespace gewebe
+} // namespace gewebe::stuffing

@@ -9,7 +9,7 @@
 #include <cmath>
 #include <memory>
 
-namespace gewebe {
+namespace gewebe::stuffing {
 namespace {
 
 /// Cells of a block: word i, bit 8 j + k.
@@ -19,9 +19,9 @@ using CellSet = std::array<std::uint64_t, 8>;
 std::vector<CellSet> cells_at_solid(const Context& context, const StuffingBlocks& blocks) {
   std::vector<CellSet> touched(blocks.size()), result(blocks.size());
   const auto each = [&](auto&& body) {
-    parallel_blocks(context, blocks.size(), 32, [&](std::size_t begin, std::size_t end) {
+    gewebe::parallel_blocks(context, blocks.size(), 32, [&](std::size_t begin, std::size_t end) {
       for (std::size_t b = begin; b < end; ++b)
-        for (int i = 0; i < leaf_dim; ++i)
+        for (int i = 0; i < gewebe::volume::leaf_dim; ++i)
           body(b, i);
     });
   };
@@ -53,25 +53,26 @@ unsigned halvings(double edge, double cell) {
 
 } // namespace
 
-RefinedCells::RefinedCells(const Grid& grid, const StuffingLattice& lattice,
+RefinedCells::RefinedCells(const volume::Grid& grid, const StuffingLattice& lattice,
                            const StuffingOptions& options)
     : grid_(grid), lattice_(lattice), regions_(options.refine), materials_(options.materials) {
-  for (const RefinedRegion& region : regions_) {
+  for (const tetrahedra::RefinedRegion& region : regions_) {
     if (!(region.cell < lattice.cell))
-      throw Error("refine '" + region.text + "': cells are " + number_text(lattice.cell) +
+      throw Error("refine '" + region.text + "': cells are " + text::number_text(lattice.cell) +
                   " mm already, expected a smaller size");
     if (!region.materials.empty() && !materials_)
       throw Error("refine '" + region.text + "': the solid has no labels, expected materials");
     levels_ = std::max(levels_, halvings(lattice.cell, region.cell));
   }
   if (levels_ > refined_levels_max)
-    throw Error("refine: cells of " + number_text(lattice.cell) + " mm would be halved " +
+    throw Error("refine: cells of " + text::number_text(lattice.cell) + " mm would be halved " +
                 std::to_string(levels_) + " times, expected at most " +
                 std::to_string(refined_levels_max));
 }
 
-bool RefinedCells::meets_shape(const RefinedRegion& region, const Vec3& first, double edge) const {
-  for (const RefinedRegion::Sphere& sphere : region.spheres) {
+bool RefinedCells::meets_shape(const tetrahedra::RefinedRegion& region, const Vec3& first,
+                               double edge) const {
+  for (const tetrahedra::RefinedRegion::Sphere& sphere : region.spheres) {
     const Vec3 centre = lattice_.to_world.to_index(sphere.centre);
     Vec3 apart;
     for (int a = 0; a < 3; ++a)
@@ -107,7 +108,7 @@ void around(const Vec3& first, double edge, int count, Visit&& visit) {
 }
 } // namespace
 
-bool RefinedCells::meets(const RefinedRegion& region, const Vec3& first, double edge,
+bool RefinedCells::meets(const tetrahedra::RefinedRegion& region, const Vec3& first, double edge,
                          Probe& probe) const {
   if (!meets_shape(region, first, edge))
     return false;
@@ -143,18 +144,18 @@ Vec3 RefinedCells::place_of(const OctreeCube& cube) const {
 }
 
 bool RefinedCells::meets_block(const Int3& origin) const {
-  return std::ranges::any_of(regions_, [&](const RefinedRegion& region) {
+  return std::ranges::any_of(regions_, [&](const tetrahedra::RefinedRegion& region) {
     return meets_shape(region,
                        {static_cast<double>(origin[0]), static_cast<double>(origin[1]),
                         static_cast<double>(origin[2])},
-                       leaf_dim);
+                       volume::leaf_dim);
   });
 }
 
 /// Has the fine lattice of a cell of the block's lattice, outside of it, a point inside?
 bool RefinedCells::has_inside(const Vec3& first, Probe& probe) const {
   double finest = HUGE_VAL;
-  for (const RefinedRegion& region : regions_)
+  for (const tetrahedra::RefinedRegion& region : regions_)
     if (meets_shape(region, first, 1))
       finest = std::fmin(finest, region.cell);
   if (!std::isfinite(finest))
@@ -184,7 +185,7 @@ StuffingOctree RefinedCells::octree(const Context& context, const StuffingBlocks
     for (std::size_t b = begin; b < end; ++b) {
       if (!meets_block(blocks[b].origin))
         continue;
-      for (unsigned i = 0; i < leaf_dim; ++i)
+      for (unsigned i = 0; i < volume::leaf_dim; ++i)
         for (unsigned bit = 0; bit < 64; ++bit)
           if (!is_set(solid[b], i, bit) &&
               has_inside(bcc::position(point_at(blocks[b], i, bit)), at))
@@ -193,7 +194,7 @@ StuffingOctree RefinedCells::octree(const Context& context, const StuffingBlocks
   });
   StuffingOctree octree(levels_ + grading.levels + 1);
   for (std::size_t b = 0; b < blocks.size(); ++b)
-    for (unsigned i = 0; i < leaf_dim; ++i)
+    for (unsigned i = 0; i < volume::leaf_dim; ++i)
       for (unsigned bit = 0; bit < 64; ++bit) {
         if (!is_set(solid[b], i, bit) && !is_set(more[b], i, bit))
           continue;
@@ -229,7 +230,7 @@ void RefinedCells::refine(StuffingOctree& octree) const {
 
 void RefinedCells::require_met(const Background& background,
                                const std::vector<bool>& inside) const {
-  for (const RefinedRegion& region : regions_) {
+  for (const tetrahedra::RefinedRegion& region : regions_) {
     const double reach = region.cell / lattice_.cell;
     bool met = false;
     for (std::size_t n = 0; n < inside.size() && !met; ++n)
@@ -243,4 +244,4 @@ void RefinedCells::require_met(const Background& background,
   }
 }
 
-} // namespace gewebe
+} // namespace gewebe::stuffing

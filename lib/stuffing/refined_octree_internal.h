@@ -13,7 +13,7 @@
 
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::stuffing {
 
 /// Cells may be halved so often.
 inline constexpr unsigned refined_levels_max = 8;
@@ -23,7 +23,8 @@ inline constexpr unsigned refined_levels_max = 8;
 class RefinedCells {
 public:
   /// \pre all of them outlive it \throw Error if a region does not suit the lattice
-  RefinedCells(const Grid& grid, const StuffingLattice& lattice, const StuffingOptions& options);
+  RefinedCells(const volume::Grid& grid, const StuffingLattice& lattice,
+               const StuffingOptions& options);
 
   unsigned levels() const { return levels_; }
   /// May a region reach into the block at this place of the lattice?
@@ -43,16 +44,17 @@ private:
   };
   Probe probe() const;
   // Cubes by their first corner, in places of the lattice, and edge.
-  bool meets_shape(const RefinedRegion& region, const Vec3& first, double edge) const;
-  bool meets(const RefinedRegion& region, const Vec3& first, double edge, Probe& probe) const;
+  bool meets_shape(const tetrahedra::RefinedRegion& region, const Vec3& first, double edge) const;
+  bool meets(const tetrahedra::RefinedRegion& region, const Vec3& first, double edge,
+             Probe& probe) const;
   bool has_inside(const Vec3& first, Probe& probe) const;
   Vec3 place_of(const OctreeCube& cube) const;
 
-  const Grid& grid_;
+  const volume::Grid& grid_;
   const StuffingLattice& lattice_;
-  const std::vector<RefinedRegion>& regions_;
+  const std::vector<tetrahedra::RefinedRegion>& regions_;
   const MaterialSource& materials_;
   unsigned levels_ = 0;
 };
 
-} // namespace gewebe
+} // namespace gewebe::stuffing

@@ -6,7 +6,7 @@
 #include <algorithm>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::stuffing {
 namespace {
 
 using Nodes = std::array<StencilNode, 4>;
@@ -19,7 +19,8 @@ Vec3 place(const StencilNode& node) {
 }
 
 void add(std::vector<Nodes>& tetrahedra, Nodes nodes) {
-  if (tetrahedron_volume(place(nodes[0]), place(nodes[1]), place(nodes[2]), place(nodes[3])) < 0)
+  if (tetrahedra::tetrahedron_volume(place(nodes[0]), place(nodes[1]), place(nodes[2]),
+                                     place(nodes[3])) < 0)
     std::swap(nodes[2], nodes[3]);
   tetrahedra.push_back(nodes);
 }
@@ -238,7 +239,7 @@ const Stencil& stencil(const std::array<int, 4>& signs, const DiagonalOrder& ord
 double least_angle_cosine(const std::array<Vec3, 4>& corners) {
   std::array<Vec3, 4> normals;
   for (std::size_t f = 0; f < 4; ++f) {
-    const auto& face = tetrahedron_faces[f];
+    const auto& face = tetrahedra::tetrahedron_faces[f];
     const Vec3 normal =
         cross(corners[face[1]] - corners[face[0]], corners[face[2]] - corners[face[0]]);
     normals[f] = normal / norm(normal);
@@ -250,4 +251,4 @@ double least_angle_cosine(const std::array<Vec3, 4>& corners) {
   return largest;
 }
 
-} // namespace gewebe
+} // namespace gewebe::stuffing

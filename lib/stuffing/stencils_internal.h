@@ -8,7 +8,7 @@
 #include <cstddef>
 #include <cstdint>
 
-namespace gewebe {
+namespace gewebe::stuffing {
 
 /// A node of a stencil: corner 0 … 3, or the cut point on the edge from an inner corner i to an
 /// outer one j.
@@ -50,4 +50,4 @@ const Stencil& stencil(const std::array<int, 4>& signs, const DiagonalOrder& ord
 /// The cosine of the least dihedral angle.
 double least_angle_cosine(const std::array<Vec3, 4>& corners);
 
-} // namespace gewebe
+} // namespace gewebe::stuffing

@@ -23,7 +23,7 @@
 // Based on: Labelle and Shewchuk, Isosurface Stuffing: Fast Tetrahedral Meshes with Good Dihedral
 // Angles, 2007.
 
-namespace gewebe {
+namespace gewebe::stuffing {
 namespace {
 
 constexpr std::size_t blocks_at_once = 8;
@@ -144,7 +144,8 @@ std::vector<std::uint64_t> count_tetrahedra(const Context& context, const Stuffi
 }
 
 void write_tetrahedra(const Context& context, const StuffingLattice& lattice,
-                      const StuffingParts& parts, const MaterialSource& materials, TetMesh& mesh) {
+                      const StuffingParts& parts, const MaterialSource& materials,
+                      tetrahedra::TetMesh& mesh) {
   Context quiet = context;
   quiet.progress = nullptr;
   const std::vector<std::uint64_t> first = count_tetrahedra(quiet, parts);
@@ -246,8 +247,9 @@ std::vector<OctreeCube> open_cells(const StuffingOctree& octree, const Backgroun
   return cells;
 }
 
-TetMesh stuff_refined(const Context& context, const Grid& grid, const StuffingOptions& options,
-                      const StuffingLattice& lattice, StuffingReport& report) {
+tetrahedra::TetMesh stuff_refined(const Context& context, const volume::Grid& grid,
+                                  const StuffingOptions& options, const StuffingLattice& lattice,
+                                  StuffingReport& report) {
   if (options.follow_interface)
     throw Error("refined cells can't follow the interface between materials, expected stairs");
   const RefinedCells cells(grid, lattice, options);
@@ -256,7 +258,7 @@ TetMesh stuff_refined(const Context& context, const Grid& grid, const StuffingOp
       context, grid, lattice, [&](const Int3& origin) { return cells.meets_block(origin); });
   for (const StuffingBlock& block : blocks)
     for (const std::int32_t place : block.origin)
-      if (std::abs(std::int64_t{place}) + leaf_dim >= std::int64_t{1} << (28 - levels))
+      if (std::abs(std::int64_t{place}) + volume::leaf_dim >= std::int64_t{1} << (28 - levels))
         throw Error(
             "the volume has cells beyond index 2^28 of the refined lattice, expected larger "
             "cells or a volume nearer to its origin");
@@ -273,7 +275,7 @@ TetMesh stuff_refined(const Context& context, const Grid& grid, const StuffingOp
       cells.require_met(background, inside);
       const BackgroundSurface surface =
           warp_background(context, grid, lattice, background, levels, std::move(inside));
-      TetMesh mesh = cut_background(lattice, background, levels, surface, report);
+      tetrahedra::TetMesh mesh = cut_background(lattice, background, levels, surface, report);
       if (options.materials)
         set_materials(context, options.materials, mesh);
       return mesh;
@@ -286,8 +288,8 @@ TetMesh stuff_refined(const Context& context, const Grid& grid, const StuffingOp
 
 } // namespace
 
-TetMesh stuff(const Context& context, const Grid& grid, const StuffingOptions& options,
-              StuffingReport* report) {
+tetrahedra::TetMesh stuff(const Context& context, const volume::Grid& grid,
+                          const StuffingOptions& options, StuffingReport* report) {
   if (options.grade > stuffing_grade_max)
     throw Error("a grade of " + std::to_string(options.grade) + ", expected 0 to " +
                 std::to_string(stuffing_grade_max));
@@ -297,7 +299,7 @@ TetMesh stuff(const Context& context, const Grid& grid, const StuffingOptions& o
   if (!options.refine.empty()) {
     StuffingReport made;
     made.cell = lattice.cell;
-    TetMesh mesh = stuff_refined(quiet, grid, options, lattice, made);
+    tetrahedra::TetMesh mesh = stuff_refined(quiet, grid, options, lattice, made);
     if (report != nullptr)
       *report = made;
     return mesh;
@@ -318,7 +320,7 @@ TetMesh stuff(const Context& context, const Grid& grid, const StuffingOptions& o
   const StuffingNodes nodes = number_nodes(quiet, blocks, grading, surface, interface);
   const StuffingParts parts{blocks, grading, surface, materials, interface, nodes};
   require_memory(context, static_cast<double>(nodes.all) * sizeof(Vec3), "the nodes");
-  TetMesh mesh;
+  tetrahedra::TetMesh mesh;
   mesh.points.resize(nodes.all);
   const double shift = write_points(quiet, lattice, parts, mesh.points);
   write_tetrahedra(context, lattice, parts, options.materials, mesh);
@@ -331,4 +333,4 @@ TetMesh stuff(const Context& context, const Grid& grid, const StuffingOptions& o
   return mesh;
 }
 
-} // namespace gewebe
+} // namespace gewebe::stuffing

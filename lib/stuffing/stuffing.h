@@ -12,7 +12,7 @@
 #include <optional>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::stuffing {
 
 /// A cut point nearer to a lattice point than this share of its edge is warped to. With these two
 /// shares every dihedral angle of every stencil lies between stuffing_angle_min and -_max; the
@@ -55,7 +55,7 @@ struct StuffingOptions {
   bool follow_interface = false;
   /// Where cells are smaller: halved until they are small enough, one step at a time from one cell
   /// to the next.
-  std::vector<RefinedRegion> refine = {};
+  std::vector<tetrahedra::RefinedRegion> refine = {};
 };
 
 struct StuffingReport {
@@ -116,7 +116,7 @@ struct StuffingReport {
 /// value at or beside the surface is not finite; if `cell` isn't finite and above 0; if
 /// `grade` is above its maximum; if indices come near the limits of 32 bits; beyond
 /// context.max_memory; what `materials` throws
-TetMesh stuff(const Context& context, const Grid& grid, const StuffingOptions& options,
-              StuffingReport* report = nullptr);
+tetrahedra::TetMesh stuff(const Context& context, const volume::Grid& grid,
+                          const StuffingOptions& options, StuffingReport* report = nullptr);
 
-} // namespace gewebe
+} // namespace gewebe::stuffing

@@ -7,7 +7,7 @@
 #include <cmath>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::stuffing {
 namespace {
 
 constexpr std::size_t grain = 1024;
@@ -18,8 +18,8 @@ struct Sum {
 };
 
 /// Distance in mm along ±`normal` (unit) from `place` to a change of side, or infinite.
-double distance(CutFinder& finder, const StuffingLattice& lattice, const GridTransform& to_world,
-                const Vec3& place, const Vec3& normal) {
+double distance(CutFinder& finder, const StuffingLattice& lattice,
+                const volume::GridTransform& to_world, const Vec3& place, const Vec3& normal) {
   const auto index = [&](double t) { return to_world.to_index(place + normal * t); };
   const double here = finder.excess(index(0));
   if (here == 0)
@@ -39,7 +39,7 @@ double distance(CutFinder& finder, const StuffingLattice& lattice, const GridTra
 
 } // namespace
 
-SurfaceDistance surface_distance(const Context& context, const Grid& grid,
+SurfaceDistance surface_distance(const Context& context, const volume::Grid& grid,
                                  const StuffingOptions& options, const TriangleMesh& surface) {
   const StuffingLattice lattice = stuffing_lattice(grid, options.isovalue, options.cell);
   const std::size_t count = surface.triangles.size();
@@ -73,4 +73,4 @@ SurfaceDistance surface_distance(const Context& context, const Grid& grid,
   return {all.largest, all.area > 0 ? all.weighted / all.area : 0, all.beyond};
 }
 
-} // namespace gewebe
+} // namespace gewebe::stuffing

@@ -8,7 +8,7 @@
 
 #include <cstdint>
 
-namespace gewebe {
+namespace gewebe::stuffing {
 
 /// From the middle of each triangle along its normal to where the volume passes the isovalue.
 struct SurfaceDistance {
@@ -19,7 +19,7 @@ struct SurfaceDistance {
 
 /// \param surface the boundary of stuff() with the same options
 /// \throw Error as stuff()
-SurfaceDistance surface_distance(const Context& context, const Grid& grid,
+SurfaceDistance surface_distance(const Context& context, const volume::Grid& grid,
                                  const StuffingOptions& options, const TriangleMesh& surface);
 
-} // namespace gewebe
+} // namespace gewebe::stuffing

@@ -6,7 +6,7 @@
 
 #include <algorithm>
 
-namespace gewebe {
+namespace gewebe::stuffing {
 namespace {
 
 constexpr std::size_t grain = 1024;
@@ -38,7 +38,7 @@ void gather(const Context& context, const StuffingBlocks& blocks,
   });
 }
 
-void find_cuts(const Context& context, const Grid& grid, const StuffingLattice& lattice,
+void find_cuts(const Context& context, const volume::Grid& grid, const StuffingLattice& lattice,
                const StuffingBlocks& blocks, SurfacePoints& surface) {
   std::vector<BoundaryLatticePoint>& points = surface.points;
   parallel_blocks(context, points.size(), grain, [&](std::size_t begin, std::size_t end) {
@@ -156,8 +156,8 @@ Meeting meeting(const LinkSigns& signs) {
   return outer_parts == 0 ? Meeting::interior : Meeting::boundary;
 }
 
-SurfacePoints warp_lattice(const Context& context, const Grid& grid, const StuffingLattice& lattice,
-                           const StuffingBlocks& blocks) {
+SurfacePoints warp_lattice(const Context& context, const volume::Grid& grid,
+                           const StuffingLattice& lattice, const StuffingBlocks& blocks) {
   SurfacePoints surface;
   if (blocks.empty())
     return surface;
@@ -174,4 +174,4 @@ SurfacePoints warp_lattice(const Context& context, const Grid& grid, const Stuff
   return surface;
 }
 
-} // namespace gewebe
+} // namespace gewebe::stuffing

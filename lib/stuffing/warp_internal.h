@@ -12,7 +12,7 @@
 #include <cstdint>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::stuffing {
 
 /// A lattice point with an edge to the other side.
 struct BoundaryLatticePoint {
@@ -81,7 +81,7 @@ enum class Meeting {
 Meeting meeting(const LinkSigns& signs);
 
 /// Finds the points and their cuts, and warps them. \throw Error as stuff()
-SurfacePoints warp_lattice(const Context& context, const Grid& grid, const StuffingLattice& lattice,
-                           const StuffingBlocks& blocks);
+SurfacePoints warp_lattice(const Context& context, const volume::Grid& grid,
+                           const StuffingLattice& lattice, const StuffingBlocks& blocks);
 
-} // namespace gewebe
+} // namespace gewebe::stuffing

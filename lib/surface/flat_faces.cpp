@@ -6,7 +6,7 @@
 #include <numeric>
 #include <unordered_map>
 
-namespace gewebe {
+namespace gewebe::surface {
 namespace {
 
 /// Faces round points, while edges are flipped.
@@ -135,4 +135,4 @@ std::vector<std::uint32_t> flip_flat_faces(TriangleMesh& mesh, std::vector<std::
   return flat;
 }
 
-} // namespace gewebe
+} // namespace gewebe::surface

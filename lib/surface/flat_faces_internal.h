@@ -6,7 +6,7 @@
 #include <cstdint>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::surface {
 
 /// Is the area 0, relative to the square of the longest edge? In the world, where positions on the
 /// lattice are rounded, `tolerance` must be larger than in index space.
@@ -20,4 +20,4 @@ inline constexpr double world_tolerance = 1e-9;
 /// \pre the mesh is closed, oriented and 2-manifold
 std::vector<std::uint32_t> flip_flat_faces(TriangleMesh& mesh, std::vector<std::uint32_t> flat);
 
-} // namespace gewebe
+} // namespace gewebe::surface

@@ -7,9 +7,9 @@
 #include <cstddef>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::surface {
 
-GradientNormalsReport gradient_normals(const Context& context, const Grid& grid,
+GradientNormalsReport gradient_normals(const Context& context, const volume::Grid& grid,
                                        TriangleMesh& mesh) {
   const std::size_t points = mesh.points.size();
   require_memory(context, static_cast<double>(points) * (sizeof(Vec3) + 3 * sizeof(float) + 1),
@@ -23,10 +23,10 @@ GradientNormalsReport gradient_normals(const Context& context, const Grid& grid,
   }
   mesh.normals.resize(points);
   std::vector<std::uint8_t> from_faces(points, 0);
-  const GridTransform& transform = grid.info().transform;
+  const volume::GridTransform& transform = grid.info().transform;
   const double sign = grid.info().level_set ? 1 : -1;
   parallel_blocks(context, points, 4096, [&](std::size_t begin, std::size_t end) {
-    Field field(grid);
+    volume::Field field(grid);
     for (std::size_t p = begin; p < end; ++p) {
       Vec3 normal = field.gradient(transform.to_index(mesh.points[p])) * sign;
       if (!(dot(normal, area[p]) > 0)) {
@@ -45,4 +45,4 @@ GradientNormalsReport gradient_normals(const Context& context, const Grid& grid,
   return report;
 }
 
-} // namespace gewebe
+} // namespace gewebe::surface

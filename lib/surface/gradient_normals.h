@@ -7,7 +7,7 @@
 
 #include <cstdint>
 
-namespace gewebe {
+namespace gewebe::surface {
 
 struct GradientNormalsReport {
   std::uint64_t from_faces = 0; ///< points whose normal is that of their faces
@@ -20,7 +20,7 @@ struct GradientNormalsReport {
 /// if the faces have no area. The result does not depend on the number of threads.
 ///
 /// \pre mesh is an isosurface of grid, in the world, counter-clockwise seen from outside
-GradientNormalsReport gradient_normals(const Context& context, const Grid& grid,
+GradientNormalsReport gradient_normals(const Context& context, const volume::Grid& grid,
                                        TriangleMesh& mesh);
 
-} // namespace gewebe
+} // namespace gewebe::surface

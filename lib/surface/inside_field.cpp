@@ -10,7 +10,7 @@
 #include <limits>
 #include <string>
 
-namespace gewebe {
+namespace gewebe::surface {
 namespace {
 
 /// The test "inside" on floats: equivalent to comparing with the double isovalue.
@@ -52,7 +52,7 @@ InsideBits inside_bits(const float* values, const Inside& inside) {
 
 /// Regions of the one-region shell of a large tile, the layer at its far sides included: these hold
 /// the blocks of all cells that touch both the tile and something else.
-void append_shell(const TileView& tile, std::vector<Int3>& regions) {
+void append_shell(const volume::TileView& tile, std::vector<Int3>& regions) {
   const int last = tile.dim - region_dim;
   for (int i = -region_dim; i <= last; i += region_dim)
     for (int j = -region_dim; j <= last; j += region_dim) {
@@ -78,11 +78,11 @@ Context without_progress(const Context& context) {
 
 } // namespace
 
-InsideField::InsideField(const Context& context, const Grid& grid, double isovalue)
+InsideField::InsideField(const Context& context, const volume::Grid& grid, double isovalue)
     : isovalue_(isovalue) {
   const Inside inside = make_inside(isovalue, grid.info().level_set);
-  const std::vector<LeafView> leaves = grid.leaves();
-  const std::vector<TileView> tiles = grid.tiles();
+  const std::vector<volume::LeafView> leaves = grid.leaves();
+  const std::vector<volume::TileView> tiles = grid.tiles();
   leaves_ = leaves.size();
   std::vector<Int3> origins; // of nodes; neighbours in the tree follow each other
   std::size_t larger = 0, largest = 0;
@@ -91,13 +91,13 @@ InsideField::InsideField(const Context& context, const Grid& grid, double isoval
     if (origins.empty() || origins.back() != origin)
       origins.push_back(origin);
   };
-  for (const LeafView& leaf : leaves) {
-    check_range(leaf.origin, leaf_dim);
+  for (const volume::LeafView& leaf : leaves) {
+    check_range(leaf.origin, volume::leaf_dim);
     add_node(leaf.origin);
   }
-  for (const TileView& tile : tiles) {
+  for (const volume::TileView& tile : tiles) {
     check_range(tile.origin, tile.dim);
-    if (tile.dim == leaf_dim)
+    if (tile.dim == volume::leaf_dim)
       add_node(tile.origin);
     else
       ++(tile.dim == region_dim ? larger : largest);
@@ -146,10 +146,10 @@ InsideField::InsideField(const Context& context, const Grid& grid, double isoval
     }
   });
   for (std::size_t n = 0; n < tiles.size(); ++n) {
-    const TileView& tile = tiles[n];
+    const volume::TileView& tile = tiles[n];
     const std::size_t number = 1 + leaves.size() + n;
     contents_[number] = {nullptr, nullptr, tile.value, inside(tile.value)};
-    if (tile.dim == leaf_dim) {
+    if (tile.dim == volume::leaf_dim) {
       place(tile.origin, number);
       continue;
     }
@@ -202,7 +202,7 @@ std::array<std::uint32_t, 8> InsideField::octants(const Int3& origin) const {
     }
   }
   for (unsigned octant = 0; octant < 8; ++octant)
-    numbers[octant] = at(shifted(origin, octant, leaf_dim));
+    numbers[octant] = at(shifted(origin, octant, volume::leaf_dim));
   return numbers;
 }
 
@@ -256,7 +256,7 @@ InsideField::Candidates InsideField::candidates(const Context& context) const {
       if (exists)
         origins.push_back(shifted(node.origin, octant, -region_dim));
     }
-  for (const TileView& tile : opposite_tiles_)
+  for (const volume::TileView& tile : opposite_tiles_)
     append_shell(tile, origins);
   std::ranges::sort(origins);
   const auto rest = std::ranges::unique(origins);
@@ -302,13 +302,14 @@ InsideField::Candidates InsideField::candidates(const Context& context) const {
             Region& region = regions[n];
             region.first[row] = static_cast<std::uint32_t>(result.blocks.size());
             for (unsigned bits = region.blocks[row]; bits != 0; bits &= bits - 1)
-              result.blocks.push_back({region.origin[0] + leaf_dim * static_cast<int>(row >> 4),
-                                       region.origin[1] + leaf_dim * static_cast<int>(row & 15),
-                                       region.origin[2] + leaf_dim * std::countr_zero(bits)});
+              result.blocks.push_back(
+                  {region.origin[0] + volume::leaf_dim * static_cast<int>(row >> 4),
+                   region.origin[1] + volume::leaf_dim * static_cast<int>(row & 15),
+                   region.origin[2] + volume::leaf_dim * std::countr_zero(bits)});
           }
       }
   }
   return result;
 }
 
-} // namespace gewebe
+} // namespace gewebe::surface

@@ -14,10 +14,10 @@
 #include <memory>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::surface {
 
 /// Word i, bit 8 j + k: voxel (i, j, k) of a block is inside.
-using InsideBits = std::array<std::uint64_t, leaf_dim>;
+using InsideBits = std::array<std::uint64_t, volume::leaf_dim>;
 
 /// std::popcount is a library call on baseline x86-64.
 inline std::uint32_t count_bits(std::uint64_t x) {
@@ -33,7 +33,7 @@ inline Int3 shifted(const Int3& origin, unsigned octant, int step) {
 }
 
 /// The 16³ blocks of a region, 16 in a row along k.
-inline constexpr int region_dim = 16 * leaf_dim;
+inline constexpr int region_dim = 16 * volume::leaf_dim;
 inline constexpr std::size_t region_rows = 256;
 inline Int3 region_origin(const Int3& block) {
   constexpr std::int32_t mask = ~(region_dim - 1);
@@ -58,7 +58,7 @@ public:
     std::uint64_t word(std::size_t i) const { return bits ? (*bits)[i] : side ? ~0ULL : 0; }
   };
 
-  InsideField(const Context& context, const Grid& grid, double isovalue);
+  InsideField(const Context& context, const volume::Grid& grid, double isovalue);
 
   double isovalue() const { return isovalue_; }
   std::size_t leaves() const { return leaves_; }
@@ -115,13 +115,13 @@ private:
 
   double isovalue_;
   std::size_t leaves_ = 0;
-  std::unique_ptr<InsideBits[]> bits_;   // of each leaf
-  std::unique_ptr<Content[]> contents_;  // background, leaves, tiles
-  std::vector<TileView> opposite_tiles_; // those larger than 8³ on the other side than it
+  std::unique_ptr<InsideBits[]> bits_;           // of each leaf
+  std::unique_ptr<Content[]> contents_;          // background, leaves, tiles
+  std::vector<volume::TileView> opposite_tiles_; // those larger than 8³ on the other side than it
   std::vector<Node> nodes_;
   IndexMap node_numbers_; // and, from nodes_.size() on, of the contents of tiles of 128³
   IndexMap large_;        // contents of tiles of 4096³
   bool has_large_ = false;
 };
 
-} // namespace gewebe
+} // namespace gewebe::surface

@@ -18,7 +18,7 @@
 // Based on: Lorensen and Cline, Marching Cubes: A High Resolution 3D Surface Construction
 // Algorithm, 1987.
 
-namespace gewebe {
+namespace gewebe::surface {
 namespace {
 
 using Content = InsideField::Content;
@@ -28,7 +28,7 @@ using Content = InsideField::Content;
 /// Inside bits of the 9³ corners of a block's cells: word[i][n] holds for each (j, k) the corner
 /// (i, j + (n & 1), k + (n >> 1)).
 struct CornerBits {
-  std::array<std::array<std::uint64_t, 4>, leaf_dim + 1> word;
+  std::array<std::array<std::uint64_t, 4>, volume::leaf_dim + 1> word;
 };
 
 using Octants = std::array<const Content*, 8>; // the block and its neighbours on the far sides
@@ -43,8 +43,8 @@ Octants octants_of(const InsideField& field, const std::array<std::uint32_t, 8>&
 CornerBits corner_bits(const Octants& octants) {
   constexpr std::uint64_t column = 0x0101010101010101U;
   CornerBits bits;
-  for (std::size_t i = 0; i <= leaf_dim; ++i) {
-    const std::size_t x = i / leaf_dim, slice = i % leaf_dim;
+  for (std::size_t i = 0; i <= volume::leaf_dim; ++i) {
+    const std::size_t x = i / volume::leaf_dim, slice = i % volume::leaf_dim;
     const std::uint64_t here = octants[x]->word(slice), y = octants[x | 2]->word(slice),
                         z = octants[x | 4]->word(slice), yz = octants[x | 6]->word(slice);
     const std::uint64_t next_z = (here >> 1 & ~(column << 7)) | (z & column) << 7;
@@ -75,7 +75,7 @@ void examine_block(const InsideField& field, const Int3& origin, SurfaceBlocks::
   const CornerBits bits = corner_bits(octants_of(field, contents));
   std::array<std::uint64_t, 8> active{};
   std::uint64_t any = 0;
-  for (std::size_t i = 0; i < leaf_dim; ++i)
+  for (std::size_t i = 0; i < volume::leaf_dim; ++i)
     any |= active[i] = active_cells(bits, i);
   if (any == 0)
     return;
@@ -85,12 +85,12 @@ void examine_block(const InsideField& field, const Int3& origin, SurfaceBlocks::
   block.active = active;
   for (unsigned n = 0; n < 8; ++n) {
     block.inside[n] = bits.word[n][0];
-    const std::uint64_t slice = bits.word[(n & 1) != 0 ? leaf_dim : 0][n >> 1];
+    const std::uint64_t slice = bits.word[(n & 1) != 0 ? volume::leaf_dim : 0][n >> 1];
     const unsigned bit = ((n & 2) != 0 ? 56U : 0U) + ((n & 4) != 0 ? 7U : 0U);
     block.outer = static_cast<std::uint8_t>(block.outer | (slice >> bit & 1) << n);
   }
   const auto& table = marching_cubes_table();
-  for (std::size_t i = 0; i < leaf_dim; ++i) {
+  for (std::size_t i = 0; i < volume::leaf_dim; ++i) {
     const std::uint64_t here = bits.word[i][0];
     const std::array<std::uint64_t, 3> crossed{here ^ bits.word[i + 1][0], here ^ bits.word[i][1],
                                                here ^ bits.word[i][2]};
@@ -121,7 +121,7 @@ using PointNumbers = std::array<std::uint32_t, edge_places>;
 /// Computes the block's fractions and, with a mesh, its points and notes their numbers.
 template <bool with_mesh>
 void write_points(const Octants& octants, const SurfaceBlock& block, double isovalue,
-                  const GridTransform& to_world, SurfaceBlocks& lattice, Vec3* points,
+                  const volume::GridTransform& to_world, SurfaceBlocks& lattice, Vec3* points,
                   PointNumbers& numbers) {
   constexpr std::array<unsigned, 3> stride{64, 8, 1};
   const std::array<double, 12> transform = to_world.m;
@@ -162,7 +162,7 @@ void write_triangles(const SurfaceBlock& block, const PointNumbers& numbers, con
                      std::vector<Triangle>& triangles) {
   const std::uint8_t* cell = block.cases;
   Triangle* out = triangles.data() + block.first_triangle;
-  for (unsigned i = 0; i < leaf_dim; ++i)
+  for (unsigned i = 0; i < volume::leaf_dim; ++i)
     for (std::uint64_t active = block.active[i]; active != 0; active &= active - 1) {
       const auto bit = static_cast<unsigned>(std::countr_zero(active));
       const std::uint32_t* const own = numbers.data() + edge_place(i, bit >> 3, bit & 7);
@@ -173,15 +173,15 @@ void write_triangles(const SurfaceBlock& block, const PointNumbers& numbers, con
     }
 }
 
-void check_input(const GridInfo& info, double isovalue) {
+void check_input(const volume::GridInfo& info, double isovalue) {
   if (!std::isfinite(isovalue))
     throw Error("the isovalue is not finite");
   const double determinant = info.transform.determinant();
   if (!std::isfinite(determinant) || determinant == 0)
     throw Error("the volume's transform is singular, expected an invertible affine map");
   if (info.band_isovalue && *info.band_isovalue != isovalue)
-    throw Error("the volume is exact only near isovalue " + number_text(*info.band_isovalue) +
-                " (made with --band), expected that one, not " + number_text(isovalue));
+    throw Error("the volume is exact only near isovalue " + text::number_text(*info.band_isovalue) +
+                " (made with --band), expected that one, not " + text::number_text(isovalue));
 }
 
 /// Notes which blocks lie round each of those of some parts, and the other way round. Each pair is
@@ -192,9 +192,9 @@ void link_neighbours(const InsideField::Candidates& candidates,
   for (std::size_t n = begin; n < end; ++n)
     for (std::size_t place = 14; place < 27; ++place) {
       Int3 origin = blocks[n]->origin;
-      origin[0] += leaf_dim * (static_cast<int>(place / 9) - 1);
-      origin[1] += leaf_dim * (static_cast<int>(place / 3 % 3) - 1);
-      origin[2] += leaf_dim * (static_cast<int>(place % 3) - 1);
+      origin[0] += volume::leaf_dim * (static_cast<int>(place / 9) - 1);
+      origin[1] += volume::leaf_dim * (static_cast<int>(place / 3 % 3) - 1);
+      origin[2] += volume::leaf_dim * (static_cast<int>(place % 3) - 1);
       const std::uint32_t candidate = candidates.find(origin);
       if (candidate == IndexMap::none || numbers[candidate] == SurfaceBlock::none)
         continue;
@@ -203,7 +203,7 @@ void link_neighbours(const InsideField::Candidates& candidates,
     }
 }
 
-IsoSurface make_surface(const Context& context, const Grid& grid,
+IsoSurface make_surface(const Context& context, const volume::Grid& grid,
                         std::optional<double> wanted_isovalue, bool with_mesh) {
   const double isovalue = wanted_isovalue.value_or(default_isovalue(grid.info()));
   check_input(grid.info(), isovalue);
@@ -213,7 +213,8 @@ IsoSurface make_surface(const Context& context, const Grid& grid,
 
   const InsideField::Candidates candidates = field.candidates(context);
   const std::size_t count = candidates.blocks.size();
-  require_memory(context, static_cast<double>(count) * (sizeof(SurfaceBlock) + leaf_voxels / 8.0),
+  require_memory(context,
+                 static_cast<double>(count) * (sizeof(SurfaceBlock) + volume::leaf_voxels / 8.0),
                  "the crossed blocks");
   constexpr std::size_t at_once = 64;
   const auto lattice = std::make_shared<SurfaceBlocks>();
@@ -302,18 +303,18 @@ IsoSurface make_surface(const Context& context, const Grid& grid,
 
 } // namespace
 
-double default_isovalue(const GridInfo& info) {
+double default_isovalue(const volume::GridInfo& info) {
   return info.level_set ? 0 : info.isovalue;
 }
 
-IsoSurface marching_cubes(const Context& context, const Grid& grid,
+IsoSurface marching_cubes(const Context& context, const volume::Grid& grid,
                           std::optional<double> isovalue) {
   return make_surface(context, grid, isovalue, true);
 }
 
-IsoSurface marching_cubes_to_snap(const Context& context, const Grid& grid,
+IsoSurface marching_cubes_to_snap(const Context& context, const volume::Grid& grid,
                                   std::optional<double> isovalue) {
   return make_surface(context, grid, isovalue, false);
 }
 
-} // namespace gewebe
+} // namespace gewebe::surface

@@ -10,7 +10,7 @@
 #include <optional>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::surface {
 
 /// Where the surface crosses an edge of the lattice: at index `corner` + fraction · e_axis.
 struct EdgeCrossing {
@@ -27,7 +27,7 @@ struct SurfaceBlocks;
 /// The mesh, and where the surface crosses the lattice.
 struct IsoSurface {
   TriangleMesh mesh;
-  GridTransform transform;
+  volume::GridTransform transform;
   std::shared_ptr<const SurfaceBlocks> lattice; ///< what `snap` works on, whatever became of `mesh`
   std::uint64_t leaves = 0;                     ///< of the grid
   std::uint64_t leaves_visited =
@@ -40,7 +40,7 @@ struct IsoSurface {
 std::vector<EdgeCrossing> edge_crossings(const IsoSurface& surface);
 
 /// Default isovalue of `grid`: info().isovalue, 0 for a level set.
-double default_isovalue(const GridInfo& info);
+double default_isovalue(const volume::GridInfo& info);
 
 /// Triangulates the surface between inside and outside (Lorensen and Cline 1987; the table of
 /// marching_cubes_table.h). Voxel centres are the corners of the cells. Inside is value > isovalue,
@@ -62,11 +62,11 @@ double default_isovalue(const GridInfo& info);
 /// isovalue (band_isovalue); if indices come near the limits of 32 bits; if a value beside the
 /// surface is not finite; if points or triangles exceed 2^32 - 2; if context.max_memory would not
 /// do
-IsoSurface marching_cubes(const Context& context, const Grid& grid,
+IsoSurface marching_cubes(const Context& context, const volume::Grid& grid,
                           std::optional<double> isovalue = {});
 
 /// The same surface for `snap` alone: its mesh, which `snap` doesn't need, is left empty.
-IsoSurface marching_cubes_to_snap(const Context& context, const Grid& grid,
+IsoSurface marching_cubes_to_snap(const Context& context, const volume::Grid& grid,
                                   std::optional<double> isovalue = {});
 
-} // namespace gewebe
+} // namespace gewebe::surface

@@ -9,7 +9,7 @@
 // Algorithm, 1987; the rule for ambiguous faces as in Montani, Scateni and Scopigno, A Modified
 // Look-up Table for Implicit Disambiguation of Marching Cubes, 1994.
 
-namespace gewebe {
+namespace gewebe::surface {
 namespace {
 
 using Loop = std::vector<int>; // crossed edges in order, counter-clockwise from outside
@@ -155,4 +155,4 @@ const std::array<CellCase, 256>& marching_cubes_table() {
   return table;
 }
 
-} // namespace gewebe
+} // namespace gewebe::surface

@@ -5,7 +5,7 @@
 #include <array>
 #include <cstdint>
 
-namespace gewebe {
+namespace gewebe::surface {
 
 // Corner c of a cell lies at (c & 1, c >> 1 & 1, c >> 2 & 1). Edge e = 4 axis + n runs along
 // `axis`; n numbers the four edges of that axis by the corner where they start.
@@ -59,4 +59,4 @@ struct CellCase {
 /// 32³ and epsilon 0.15, naive snapping broke 4, but 169 with the first triangulation.
 const std::array<CellCase, 256>& marching_cubes_table();
 
-} // namespace gewebe
+} // namespace gewebe::surface

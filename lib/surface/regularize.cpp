@@ -19,7 +19,7 @@
 
 // Based on: Botsch and Kobbelt, A Remeshing Approach to Multiresolution Modeling, 2004.
 
-namespace gewebe {
+namespace gewebe::surface {
 namespace {
 
 using Index = std::uint32_t;
@@ -59,20 +59,21 @@ public:
       outgoing_[start(h)] = h;
       ++valence_[start(h)];
     }
-    EdgeSides(points_.size(), faces_)
-        .for_each_edge([&](std::uint32_t, std::span<const EdgeSide> edge) {
-          if (edge.size() != 2 || surplus(edge) != 0)
+    mesh::EdgeSides(points_.size(), faces_)
+        .for_each_edge([&](std::uint32_t, std::span<const mesh::EdgeSide> edge) {
+          if (edge.size() != 2 || mesh::surplus(edge) != 0)
             throw Error("the mesh has an edge of " + std::to_string(edge.size()) +
-                        (surplus(edge) != 0 ? " faces that do not agree" : " faces") +
+                        (mesh::surplus(edge) != 0 ? " faces that do not agree" : " faces") +
                         ", expected a closed mesh with two at each");
-          const Index h = next_corner(edge[0].corner()), back = next_corner(edge[1].corner());
+          const Index h = mesh::next_corner(edge[0].corner()),
+                      back = mesh::next_corner(edge[1].corner());
           twin_[h] = back;
           twin_[back] = h;
         });
   }
 
-  static Index following(Index h) { return next_corner(h); }
-  static Index preceding(Index h) { return previous_corner(h); }
+  static Index following(Index h) { return mesh::next_corner(h); }
+  static Index preceding(Index h) { return mesh::previous_corner(h); }
   Index start(Index h) const { return faces_[h / 3][h % 3]; }
 
   /// Calls visit(h) for each half-edge that leaves p.
@@ -163,7 +164,7 @@ private:
 /// The isosurface of the volume's trilinear interpolation; for one thread.
 class IsoField {
 public:
-  IsoField(const Grid& grid, double isovalue)
+  IsoField(const volume::Grid& grid, double isovalue)
       : field_(grid), transform_(grid.info().transform), isovalue_(isovalue) {
     const Vec3 edges = transform_.voxel_size();
     voxel_ = std::fmin(edges.x, std::fmin(edges.y, edges.z));
@@ -211,8 +212,8 @@ public:
   }
 
 private:
-  Field field_;
-  const GridTransform& transform_;
+  volume::Field field_;
+  const volume::GridTransform& transform_;
   double isovalue_, voxel_ = 0;
 };
 
@@ -272,7 +273,7 @@ bool may_move(const FlippingMesh& mesh, const TriangleMesh& shape, Index p, cons
 /// The rounds of one attempt, in which some points are kept.
 class Attempt {
 public:
-  Attempt(const Context& context, const Grid& grid, double isovalue, TriangleMesh& mesh,
+  Attempt(const Context& context, const volume::Grid& grid, double isovalue, TriangleMesh& mesh,
           const std::vector<std::uint8_t>& kept)
       : context_(context), grid_(grid), isovalue_(isovalue), mesh_(mesh), kept_(kept),
         flipping_(mesh, kept), field_(grid, isovalue), wishes_(mesh.points.size()) {
@@ -313,7 +314,7 @@ private:
   }
 
   Context context_;
-  const Grid& grid_;
+  const volume::Grid& grid_;
   double isovalue_;
   TriangleMesh& mesh_;
   const std::vector<std::uint8_t>& kept_;
@@ -348,7 +349,7 @@ std::uint64_t keep_around(const TriangleMesh& mesh, const std::vector<std::uint3
 
 } // namespace
 
-RegularizeReport regularize(const Context& context, const Grid& grid, double isovalue,
+RegularizeReport regularize(const Context& context, const volume::Grid& grid, double isovalue,
                             TriangleMesh& mesh, const RegularizeOptions& options) {
   if (options.rounds < 0)
     throw Error("the number of rounds is negative, expected 0 or more");
@@ -377,7 +378,7 @@ RegularizeReport regularize(const Context& context, const Grid& grid, double iso
         attempt.flip();
       // Most cuts come early: looked for after 1, 2, 4 … rounds, so that little is done in vain.
       if (std::has_single_bit(static_cast<unsigned>(round)) || round == options.rounds)
-        fresh = keep_around(better, self_intersections(quiet, better).faces, rings, kept);
+        fresh = keep_around(better, mesh::self_intersections(quiet, better).faces, rings, kept);
     }
     kept_points += fresh;
     if (fresh == 0) {
@@ -389,4 +390,4 @@ RegularizeReport regularize(const Context& context, const Grid& grid, double iso
   }
 }
 
-} // namespace gewebe
+} // namespace gewebe::surface

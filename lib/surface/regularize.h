@@ -7,7 +7,7 @@
 
 #include <cstdint>
 
-namespace gewebe {
+namespace gewebe::surface {
 
 struct RegularizeOptions {
   int rounds = 10;
@@ -43,7 +43,7 @@ struct RegularizeReport {
 /// \pre mesh is the isosurface of grid at isovalue, closed, 2-manifold, oriented; the transform is
 /// invertible
 /// \throw Error if rounds is negative or context.max_memory would not do
-RegularizeReport regularize(const Context& context, const Grid& grid, double isovalue,
+RegularizeReport regularize(const Context& context, const volume::Grid& grid, double isovalue,
                             TriangleMesh& mesh, const RegularizeOptions& options);
 
-} // namespace gewebe
+} // namespace gewebe::surface

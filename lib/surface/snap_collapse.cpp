@@ -14,7 +14,7 @@
 
 // Based on: Dey, Edelsbrunner, Guha and Nekhayev, Topology Preserving Edge Contraction, 1999.
 
-namespace gewebe {
+namespace gewebe::surface {
 namespace {
 
 constexpr std::size_t blocks_at_once = 64;
@@ -122,7 +122,7 @@ public:
     for (unsigned back = 0; back < 8; ++back)
       if (dropped_[back] != 0)
         drop_faces(scene_.merges,
-                   scene_.lattice.spot(block_, shifted({0, 0, 0}, back, -leaf_dim)).block,
+                   scene_.lattice.spot(block_, shifted({0, 0, 0}, back, -volume::leaf_dim)).block,
                    dropped_[back]);
   }
 
@@ -448,7 +448,7 @@ SnapMerges merge_snap_clusters(const Context& context, SnapLattice& lattice,
           CornerWords& several = corners.several;
           const CornerWords& entered = place == SnapOptions::Place::corner ? corners.some : several;
           unsigned slices = 0;
-          for (unsigned i = 0; i < leaf_dim; ++i) {
+          for (unsigned i = 0; i < volume::leaf_dim; ++i) {
             part.corners += count_bits(corners.some[i]);
             part.clusters += count_bits(several[i]);
             slices |= (several[i] | entered[i]) != 0 ? 1U << i : 0U;
@@ -457,10 +457,10 @@ SnapMerges merge_snap_clusters(const Context& context, SnapLattice& lattice,
             continue;
           bits.enter(n, slices);
           if (place == SnapOptions::Place::corner)
-            for (unsigned i = 0; i < leaf_dim; ++i)
+            for (unsigned i = 0; i < volume::leaf_dim; ++i)
               for (std::uint64_t left = corners.some[i]; left != 0; left &= left - 1)
                 bits.mark_moved(i, static_cast<unsigned>(std::countr_zero(left)));
-          for (unsigned i = 0; i < leaf_dim; ++i)
+          for (unsigned i = 0; i < volume::leaf_dim; ++i)
             for (; several[i] != 0; several[i] &= several[i] - 1) {
               const auto bit = static_cast<unsigned>(std::countr_zero(several[i]));
               const LatticeSpot at{static_cast<std::uint32_t>(n), i, bit};
@@ -499,4 +499,4 @@ SnapMerges merge_snap_clusters(const Context& context, SnapLattice& lattice,
   return merges;
 }
 
-} // namespace gewebe
+} // namespace gewebe::surface

@@ -8,7 +8,7 @@
 #include <memory>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::surface {
 
 /// Result of the merges. Steps of `snap` mark points in the lattice's SnapBlocks. `merged`: the
 /// point was merged into another. `looked_at`: others were merged into it. `crowded`: another point
@@ -62,4 +62,4 @@ struct SnapMerges {
 SnapMerges merge_snap_clusters(const Context& context, SnapLattice& lattice,
                                SnapOptions::Place place, bool always_careful = false);
 
-} // namespace gewebe
+} // namespace gewebe::surface

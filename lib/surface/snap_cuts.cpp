@@ -8,7 +8,7 @@
 #include <algorithm>
 #include <iterator>
 
-namespace gewebe {
+namespace gewebe::surface {
 namespace {
 
 Box3 box_of(const TriangleMesh& mesh, std::uint32_t face) {
@@ -19,13 +19,13 @@ Box3 box_of(const TriangleMesh& mesh, std::uint32_t face) {
 }
 
 /// Box of the world around a block's cells and what their faces may reach when they move.
-Box3 box_of(const SurfaceBlock& block, const GridTransform& transform) {
+Box3 box_of(const SurfaceBlock& block, const volume::GridTransform& transform) {
   Box3 box;
   for (unsigned corner = 0; corner < 8; ++corner) {
     Vec3 at;
     for (int a = 0; a < 3; ++a)
       at[a] = block.origin[static_cast<std::size_t>(a)] +
-              ((corner >> a & 1) != 0 ? leaf_dim + 1.0 : -1.0);
+              ((corner >> a & 1) != 0 ? volume::leaf_dim + 1.0 : -1.0);
     box.add(transform.to_world(at));
   }
   return box;
@@ -107,7 +107,7 @@ private:
 
 } // namespace
 
-CellDirections make_directions(const GridTransform& transform) {
+CellDirections make_directions(const volume::GridTransform& transform) {
   const auto& m = transform.m;
   CellDirections directions{};
   for (unsigned c = 0; c < directions.size(); ++c) {
@@ -144,7 +144,7 @@ std::vector<std::uint32_t> find_cutting_faces(const Context& context, const Snap
   }
   if (suspects.empty())
     return {};
-  const FaceIntersections exact(snapped.mesh);
+  const mesh::FaceIntersections exact(snapped.mesh);
   std::vector<std::uint8_t> is_suspect(snapped.mesh.triangles.size());
   for (const SuspectFace& suspect : suspects)
     is_suspect[suspect.face] = 1;
@@ -165,4 +165,4 @@ std::vector<std::uint32_t> find_cutting_faces(const Context& context, const Snap
   return cutting;
 }
 
-} // namespace gewebe
+} // namespace gewebe::surface

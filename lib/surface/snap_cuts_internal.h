@@ -10,12 +10,12 @@
 #include <span>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::surface {
 
 /// Of each case of a cell: the direction from its corners inside to those outside, in the world, of
 /// length 1; 0 where none leads out of the cell more than another.
 using CellDirections = std::array<Vec3, 256>;
-CellDirections make_directions(const GridTransform& transform);
+CellDirections make_directions(const volume::GridTransform& transform);
 
 /// Does a face look out of its cell at 60 degrees or more from the cell's direction?
 /// \param normal  of any length
@@ -28,7 +28,7 @@ inline bool is_turned(const Vec3& normal, const Vec3& direction) {
 struct SnappedFaces {
   const TriangleMesh& mesh;
   const SurfaceBlocks& surface;
-  const GridTransform& transform;
+  const volume::GridTransform& transform;
   std::span<const std::uint32_t> first_face; ///< of each block, and their end
 };
 
@@ -43,4 +43,4 @@ struct SuspectFace {
 std::vector<std::uint32_t> find_cutting_faces(const Context& context, const SnappedFaces& snapped,
                                               std::vector<SuspectFace> suspects);
 
-} // namespace gewebe
+} // namespace gewebe::surface

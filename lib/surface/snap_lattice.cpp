@@ -11,7 +11,7 @@
 
 // Based on: report FZKA 7190, Forschungszentrum Karlsruhe, 2006, section 3.1.4.
 
-namespace gewebe {
+namespace gewebe::surface {
 namespace {
 
 constexpr std::uint64_t last_row = std::uint64_t{0xff} << 56;
@@ -112,11 +112,12 @@ void SnapLattice::classify(const Context& context, double epsilon) {
       const auto add = [&](std::size_t place, unsigned axis, std::uint64_t draws) {
         if (draws != 0 && block.neighbours.at(place) == SurfaceBlock::none)
           missing[begin / blocks_at_once].push_back(
-              {shifted(block.origin, 1U << axis, leaf_dim), static_cast<std::uint32_t>(n), axis});
+              {shifted(block.origin, 1U << axis, volume::leaf_dim), static_cast<std::uint32_t>(n),
+               axis});
       };
       const EdgeWords& high = snaps_[n].high;
       std::uint64_t y = 0, z = 0;
-      for (std::size_t i = 0; i < leaf_dim; ++i) {
+      for (std::size_t i = 0; i < volume::leaf_dim; ++i) {
         y |= high[3 * i + 1];
         z |= high[3 * i + 2];
       }
@@ -138,7 +139,7 @@ void SnapLattice::keep(std::span<const Int3> corners) {
       for (const int back : {0, 1}) {
         Int3 start = corner;
         start.at(axis) -= back;
-        const Int3 origin = leaf_origin(start);
+        const Int3 origin = volume::leaf_origin(start);
         const auto found = std::ranges::lower_bound(
             surface_.blocks, origin, {}, [](const SurfaceBlock* block) { return block->origin; });
         if (found == surface_.blocks.end() || (*found)->origin != origin)
@@ -195,7 +196,7 @@ SnapLattice::Corners SnapLattice::corners(std::size_t n) const {
   const SnapBlock &here = snaps(n), &x_before = neighbour(own, -1, 0, 0),
                   &y_before = neighbour(own, 0, -1, 0), &z_before = neighbour(own, 0, 0, -1);
   Corners result;
-  for (std::size_t i = 0; i < leaf_dim; ++i) {
+  for (std::size_t i = 0; i < volume::leaf_dim; ++i) {
     const std::size_t w = 3 * i;
     const std::array<std::uint64_t, 6> words{here.low[w],
                                              here.low[w + 1],
@@ -312,7 +313,7 @@ EdgeWords SnapLattice::fin_candidates(std::size_t n) const {
                 xz_below = word(x_before, 7, 0) | next_column(word(x_before, 7, 0), ~0ULL) |
                            word(x_before, 7, 2) | word(here, 0, 2);
   EdgeWords found;
-  for (std::size_t i = 0; i < leaf_dim; ++i) {
+  for (std::size_t i = 0; i < volume::leaf_dim; ++i) {
     const std::uint64_t x = word(here, i, 0), y = word(here, i, 1), z = word(here, i, 2);
     const std::uint64_t xy = x | next_row(x, word(y_after, i, 0)) | y | next_slice(here, i, 1),
                         xz = x | next_column(x, word(z_after, i, 0)) | z | next_slice(here, i, 2),
@@ -440,7 +441,7 @@ void SnapLattice::apply_fin_rule(const Context& context) {
     fin_[n].at(own.word(f.axis)) |= std::uint64_t{1} << own.bit;
     LatticeSpot at = spot(n, from_origin(n, f.corner));
     if (at.block == SurfaceBlock::none)
-      at.block = further_numbers_.find(leaf_origin(f.corner));
+      at.block = further_numbers_.find(volume::leaf_origin(f.corner));
     fin_draws_[at.block].at(at.slice) |= std::uint64_t{1} << at.bit;
   }
 }
@@ -454,4 +455,4 @@ const SnapFin& SnapLattice::fin_of(std::uint32_t point) const {
   return *std::ranges::lower_bound(fins_by_point_, point, {}, &SnapFin::point);
 }
 
-} // namespace gewebe
+} // namespace gewebe::surface

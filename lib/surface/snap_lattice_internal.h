@@ -12,7 +12,7 @@
 #include <span>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::surface {
 
 /// What snapping knows of a block's points.
 struct SnapBlock {
@@ -157,4 +157,4 @@ void SnapLattice::for_members(std::size_t n, const Int3& corner, Visit&& visit) 
     }
 }
 
-} // namespace gewebe
+} // namespace gewebe::surface

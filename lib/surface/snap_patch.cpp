@@ -5,7 +5,7 @@
 #include <cstring>
 #include <emmintrin.h>
 
-namespace gewebe {
+namespace gewebe::surface {
 namespace {
 
 constexpr PatchCorners all_corners = (1U << 27) - 1;
@@ -321,9 +321,9 @@ void SnapPatches::enter(std::size_t n, unsigned slices) {
     const std::size_t first = s == 0 ? 0 : s < 9 ? 9 : 18, slice = (s + 7) % 8;
     const auto fill = [&](Rows& rows, auto&& word) {
       std::uint16_t* const out = rows.data() + padded * s;
-      out[0] = row(word(first), word(first + 1), word(first + 2), 56);
-      spread(out + 1, word(first + 3), word(first + 4), word(first + 5));
-      out[9] = row(word(first + 6), word(first + 7), word(first + 8), 0);
+      out[0] = gewebe::surface::row(word(first), word(first + 1), word(first + 2), 56);
+      gewebe::surface::spread(out + 1, word(first + 3), word(first + 4), word(first + 5));
+      out[9] = gewebe::surface::row(word(first + 6), word(first + 7), word(first + 8), 0);
     };
     fill(rows_[inside], [&](std::size_t place) { return (*corners[place])[slice]; });
     for (std::size_t axis = 0; axis < 3; ++axis) {
@@ -421,4 +421,4 @@ bool SnapPatches::take(unsigned slice, unsigned bit, PatchMerges& result) {
   return true;
 }
 
-} // namespace gewebe
+} // namespace gewebe::surface

@@ -12,7 +12,7 @@
 #include <cstddef>
 #include <cstdint>
 
-namespace gewebe {
+namespace gewebe::surface {
 
 /// Bits of the corners of a patch.
 using PatchCorners = std::uint32_t;
@@ -64,4 +64,4 @@ private:
   bool has_fins_ = false;
 };
 
-} // namespace gewebe
+} // namespace gewebe::surface

@@ -19,7 +19,7 @@
 
 // Based on: report FZKA 7190, Forschungszentrum Karlsruhe, 2006, section 3.1.4.
 
-namespace gewebe {
+namespace gewebe::surface {
 namespace {
 
 /// A quick test. \param normal  cross(u, v)
@@ -32,7 +32,7 @@ bool has_much_area(const Vec3& u, const Vec3& v, const Vec3& normal, double enou
 /// The test of has_no_area, but in the world: an affine map changes the ratio of an
 /// area to a square by no more than its condition, which is below the product of the norms of the
 /// matrix and its inverse; infinite if that is unknown.
-double enough_area(const GridTransform& transform) {
+double enough_area(const volume::GridTransform& transform) {
   const auto& m = transform.m;
   const Vec3 rows[3]{{m[0], m[1], m[2]}, {m[4], m[5], m[6]}, {m[8], m[9], m[10]}};
   const Vec3 minors[3]{cross(rows[1], rows[2]), cross(rows[2], rows[0]), cross(rows[0], rows[1])};
@@ -120,7 +120,7 @@ private:
 
   Context context_;
   const SurfaceBlocks& surface_;
-  GridTransform transform_;
+  volume::GridTransform transform_;
   const SnapLattice& lattice_;
   SnapMerges& merges_;
   bool at_corners_;
@@ -215,7 +215,7 @@ void SnappedMesh::note_points(std::size_t n, PlaceNumbers& numbers) const {
 
 /// What a block's faces become before they go to the mesh.
 struct BlockFaces {
-  static constexpr std::size_t max_made = std::size_t{max_cell_triangles} * leaf_voxels;
+  static constexpr std::size_t max_made = std::size_t{max_cell_triangles} * volume::leaf_voxels;
   std::array<Triangle, max_made + 1> made;
   std::array<std::uint16_t, max_made + 1> picked, picked_from; ///< of `made`; of the block's faces
   std::array<std::uint8_t, max_made + 1> picked_case, crowded; ///< of its cell; has such a point
@@ -229,7 +229,7 @@ void make_faces(const SurfaceBlock& block, const std::uint64_t* numbers, const C
   const std::uint8_t* cell = block.cases;
   std::size_t made = 0, picked = 0;
   std::uint16_t face = 0;
-  for (unsigned i = 0; i < leaf_dim; ++i)
+  for (unsigned i = 0; i < volume::leaf_dim; ++i)
     for (std::uint64_t active = block.active[i]; active != 0; active &= active - 1) {
       const auto bit = static_cast<unsigned>(std::countr_zero(active));
       const std::uint64_t* const at = numbers + edge_place(i, bit >> 3, bit & 7);
@@ -303,7 +303,7 @@ std::array<SnappedMesh::PointRef, 3> SnappedMesh::corners_of(const SmallFace& fa
   const SurfaceBlock& block = *surface_.blocks[face.block];
   const std::uint8_t* cell = block.cases;
   std::uint32_t after = 0;
-  for (unsigned i = 0; i < leaf_dim; ++i)
+  for (unsigned i = 0; i < volume::leaf_dim; ++i)
     for (std::uint64_t active = block.active[i]; active != 0; active &= active - 1, ++cell) {
       const CellPlan& plan = plans_[*cell];
       after += plan.triangles;
@@ -484,4 +484,4 @@ SnapResult snap(const Context& context, const IsoSurface& surface, const SnapOpt
   return best;
 }
 
-} // namespace gewebe
+} // namespace gewebe::surface

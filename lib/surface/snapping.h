@@ -8,7 +8,7 @@
 
 #include <cstdint>
 
-namespace gewebe {
+namespace gewebe::surface {
 
 struct SnapOptions {
   /// Where merged points go: to the mean of their crossings, weighted by 1 - 1.5 d where d is the
@@ -70,4 +70,4 @@ struct SnapResult {
 /// \throw Error if epsilon is not within 0 … 0.5, or if context.max_memory would not do
 SnapResult snap(const Context& context, const IsoSurface& surface, const SnapOptions& options);
 
-} // namespace gewebe
+} // namespace gewebe::surface

@@ -1,6 +1,6 @@
 #include "surface/surface_blocks_internal.h"
 
-namespace gewebe {
+namespace gewebe::surface {
 
 Vec3 index_position(const EdgeCrossing& crossing) {
   Vec3 p{static_cast<double>(crossing.corner[0]), static_cast<double>(crossing.corner[1]),
@@ -42,4 +42,4 @@ CellPlans make_plans(bool mirrored) {
   return plans;
 }
 
-} // namespace gewebe
+} // namespace gewebe::surface

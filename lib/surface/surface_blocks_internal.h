@@ -17,10 +17,10 @@
 #include <memory>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::surface {
 
-using CornerWords = std::array<std::uint64_t, leaf_dim>;
-using EdgeWords = std::array<std::uint64_t, std::size_t{3} * leaf_dim>;
+using CornerWords = std::array<std::uint64_t, volume::leaf_dim>;
+using EdgeWords = std::array<std::uint64_t, std::size_t{3} * volume::leaf_dim>;
 
 /// An edge of a block as one number, to go through its points without searching words for bits.
 struct BlockEdge {
@@ -154,4 +154,4 @@ inline Vec3 world_position(const std::array<double, 12>& m, const Vec3& p) {
           m[8] * p.x + m[9] * p.y + m[10] * p.z + m[11]};
 }
 
-} // namespace gewebe
+} // namespace gewebe::surface

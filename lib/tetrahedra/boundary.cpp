@@ -6,7 +6,7 @@
 #include <span>
 #include <utility>
 
-namespace gewebe {
+namespace gewebe::tetrahedra {
 namespace {
 
 /// The edge of a tetrahedron between its corners a and b, in the order of EdgeMiddles.
@@ -75,4 +75,4 @@ TetBoundary boundary(const TetMesh& mesh) {
   return result;
 }
 
-} // namespace gewebe
+} // namespace gewebe::tetrahedra

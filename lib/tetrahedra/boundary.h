@@ -8,7 +8,7 @@
 #include <cstdint>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::tetrahedra {
 
 /// The faces of exactly one tetrahedron.
 struct TetBoundary {
@@ -27,4 +27,4 @@ struct TetBoundary {
 /// \pre check_mesh(mesh) passes   \throw Error if there are 2^30 tetrahedra or more
 TetBoundary boundary(const TetMesh& mesh);
 
-} // namespace gewebe
+} // namespace gewebe::tetrahedra

@@ -15,7 +15,7 @@
 #include <utility>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::tetrahedra {
 namespace {
 
 /// The side on which corner d lies of the triangle abc: 1 as in a positive tetrahedron, -1, or 0 if
@@ -132,11 +132,11 @@ private:
     for (const std::uint32_t number : outer_)
       triangles.push_back(corners_of_face(mesh_.tetrahedra[number / 4], number % 4));
     DisjointSets corners(3 * triangles.size());
-    const EdgeSides edges(mesh_.points.size(), triangles);
-    edges.for_each_edge([&](std::uint32_t low, std::span<const EdgeSide> edge) {
+    const mesh::EdgeSides edges(mesh_.points.size(), triangles);
+    edges.for_each_edge([&](std::uint32_t low, std::span<const mesh::EdgeSide> edge) {
       if (edge.size() != 2)
         report_.nonmanifold_edges.add(low);
-      for (const EdgeSide& other : edge.subspan(1)) {
+      for (const mesh::EdgeSide& other : edge.subspan(1)) {
         corners.join(edge[0].low_corner(), other.low_corner());
         corners.join(edge[0].high_corner(), other.high_corner());
       }
@@ -312,4 +312,4 @@ TetRepair repair_tetrahedra(TetMesh& mesh, const TetRepairOptions& options) {
   return done;
 }
 
-} // namespace gewebe
+} // namespace gewebe::tetrahedra

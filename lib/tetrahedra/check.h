@@ -5,7 +5,7 @@
 
 #include <cstdint>
 
-namespace gewebe {
+namespace gewebe::tetrahedra {
 
 /// Number of faulty elements of a kind, and the first of them.
 struct TetFinding {
@@ -85,4 +85,4 @@ TetRepair repair_tetrahedra(TetMesh& mesh, const TetRepairOptions& options = {})
 /// Removes the points that are neither corner nor middle; returns how many.
 std::uint64_t drop_unused_points(TetMesh& mesh);
 
-} // namespace gewebe
+} // namespace gewebe::tetrahedra

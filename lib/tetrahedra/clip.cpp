@@ -11,7 +11,7 @@
 #include <string>
 #include <utility>
 
-namespace gewebe {
+namespace gewebe::tetrahedra {
 namespace {
 
 /// A corner of what is left, while its number is not known: a node by its number, a crossing by
@@ -252,4 +252,4 @@ TetClip clip_tetrahedra(const TetMesh& mesh, const ClipPlane& plane) {
   return Clipper(mesh, plane).clip();
 }
 
-} // namespace gewebe
+} // namespace gewebe::tetrahedra

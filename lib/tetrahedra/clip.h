@@ -9,7 +9,7 @@
 #include <cstdint>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::tetrahedra {
 
 /// What lies on the side of the normal is taken away: (p - point) · normal > 0.
 struct ClipPlane {
@@ -53,4 +53,4 @@ struct TetClip {
 /// many points
 TetClip clip_tetrahedra(const TetMesh& mesh, const ClipPlane& plane);
 
-} // namespace gewebe
+} // namespace gewebe::tetrahedra

@@ -6,7 +6,7 @@
 #include <algorithm>
 #include <numeric>
 
-namespace gewebe {
+namespace gewebe::tetrahedra {
 namespace {
 
 /// Of each tetrahedron the number of its component; components are numbered by their first point.
@@ -49,7 +49,7 @@ std::uint64_t component_count(const TetMesh& mesh) {
   return count;
 }
 
-TetComponentReport keep_components(TetMesh& mesh, const ComponentChoice& choice) {
+TetComponentReport keep_components(TetMesh& mesh, const mesh::ComponentChoice& choice) {
   std::uint32_t count = 0;
   const std::vector<std::uint32_t> component = components(mesh, count);
   std::vector<double> volumes(count);
@@ -85,4 +85,4 @@ TetComponentReport keep_components(TetMesh& mesh, const ComponentChoice& choice)
   return report;
 }
 
-} // namespace gewebe
+} // namespace gewebe::tetrahedra

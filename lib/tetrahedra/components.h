@@ -6,7 +6,7 @@
 
 #include <cstdint>
 
-namespace gewebe {
+namespace gewebe::tetrahedra {
 
 struct TetComponentReport {
   std::uint64_t kept = 0, dropped = 0;
@@ -17,9 +17,9 @@ struct TetComponentReport {
 /// Drops components (of tetrahedra connected by corners) by their volume; of equal ones the one
 /// with the first point counts as larger. What stays keeps its order, points that only they use
 /// vanish. \pre check_mesh(mesh) passes
-TetComponentReport keep_components(TetMesh& mesh, const ComponentChoice& choice);
+TetComponentReport keep_components(TetMesh& mesh, const mesh::ComponentChoice& choice);
 
 /// Number of components.
 std::uint64_t component_count(const TetMesh& mesh);
 
-} // namespace gewebe
+} // namespace gewebe::tetrahedra

@@ -6,7 +6,7 @@
 #include <string>
 #include <utility>
 
-namespace gewebe {
+namespace gewebe::tetrahedra {
 namespace {
 
 void check_count(std::size_t tetrahedra, std::size_t max) {
@@ -89,4 +89,4 @@ TetEdges::TetEdges(std::size_t points, std::span<const Tetrahedron> tetrahedra)
   fill(first_, sides_, [&](const auto& visit) { for_each_side_edge(tetrahedra, visit); });
 }
 
-} // namespace gewebe
+} // namespace gewebe::tetrahedra

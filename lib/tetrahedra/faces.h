@@ -10,7 +10,7 @@
 #include <span>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::tetrahedra {
 
 /// Such a tetrahedron has no volume. It has no faces and edges in the tables below.
 inline bool has_equal_corners(const Tetrahedron& t) {
@@ -104,4 +104,4 @@ private:
   std::vector<TetEdge> sides_;
 };
 
-} // namespace gewebe
+} // namespace gewebe::tetrahedra

@@ -6,7 +6,7 @@
 #include <cmath>
 #include <optional>
 
-namespace gewebe {
+namespace gewebe::tetrahedra {
 namespace {
 
 constexpr double outside_by = 1e-9; // of barycentric coordinates
@@ -273,4 +273,4 @@ void interpolate_on_lattice(const TetMesh& mesh, std::span<const Vec3> values,
   Interpolation(mesh, values, lattice, field, context);
 }
 
-} // namespace gewebe
+} // namespace gewebe::tetrahedra

@@ -12,7 +12,7 @@
 #include <span>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::tetrahedra {
 
 /// Places origin + i step[0] + j step[1] + k step[2], numbered (k·size[1] + j)·size[0] + i.
 struct PlaceLattice {
@@ -42,4 +42,4 @@ void interpolate_on_lattice(const TetMesh& mesh, std::span<const Vec3> values,
                             const PlaceLattice& lattice, LatticeField& field,
                             const Context& context);
 
-} // namespace gewebe
+} // namespace gewebe::tetrahedra

@@ -11,7 +11,7 @@
 #include <string>
 #include <utility>
 
-namespace gewebe {
+namespace gewebe::tetrahedra {
 
 NodeOrder order_nodes(TetMesh& mesh) {
   enum Group : std::uint8_t { surface_corner, surface_middle, inner_corner, inner_middle, unused };
@@ -122,4 +122,4 @@ TetMesh linear_parts(TetMesh mesh) {
   return result;
 }
 
-} // namespace gewebe
+} // namespace gewebe::tetrahedra

@@ -6,7 +6,7 @@
 #include <cstdint>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::tetrahedra {
 
 /// How nodes are numbered: groups one after the other, each in its old order.
 struct NodeOrder {
@@ -37,4 +37,4 @@ void make_quadratic(TetMesh& mesh);
 /// \pre check_mesh(mesh) passes
 TetMesh linear_parts(TetMesh mesh);
 
-} // namespace gewebe
+} // namespace gewebe::tetrahedra

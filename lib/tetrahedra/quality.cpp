@@ -5,7 +5,7 @@
 #include <cstddef>
 #include <map>
 
-namespace gewebe {
+namespace gewebe::tetrahedra {
 namespace {
 
 constexpr double degrees = 57.295779513082320877;
@@ -133,4 +133,4 @@ TetQuality tet_quality(const TetMesh& mesh) {
   return tet_quality(mesh, boundary(mesh));
 }
 
-} // namespace gewebe
+} // namespace gewebe::tetrahedra

@@ -9,7 +9,7 @@
 #include <cstdint>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::tetrahedra {
 
 /// Tetrahedra of one material.
 struct MaterialShare {
@@ -25,7 +25,7 @@ struct TetQuality {
   /// Dihedral angles, degrees, and whose they are (the first); 0 and 0 without tetrahedra.
   double smallest_angle = 0, largest_angle = 0;
   std::uint32_t smallest_angle_at = 0, largest_angle_at = 0;
-  Histogram angles; ///< of all six of each tetrahedron: 18 bins of 10 degrees
+  mesh::Histogram angles; ///< of all six of each tetrahedron: 18 bins of 10 degrees
   /// Largest ratio of the circumsphere's radius to the shortest edge (0.61 of a regular one).
   double radius_edge_ratio = 0;
   double volume = 0, smallest_volume = 0; ///< mm³, signed
@@ -49,4 +49,4 @@ std::array<double, 6> dihedral_angles(const Vec3& a, const Vec3& b, const Vec3& 
 /// Radius of the sphere through four points over the shortest distance between two of them.
 double radius_edge_ratio(const Vec3& a, const Vec3& b, const Vec3& c, const Vec3& d);
 
-} // namespace gewebe
+} // namespace gewebe::tetrahedra

@@ -8,7 +8,7 @@
 #include <cmath>
 #include <system_error>
 
-namespace gewebe {
+namespace gewebe::tetrahedra {
 namespace {
 
 std::string_view trimmed(std::string_view text) {
@@ -25,7 +25,7 @@ std::string_view trimmed(std::string_view text) {
 
 double number(std::string_view word, std::string_view whole, const std::string& expected) {
   double value = 0;
-  const std::string_view digits = without_plus(trimmed(word));
+  const std::string_view digits = text::without_plus(trimmed(word));
   const auto [end, error] = std::from_chars(digits.data(), digits.data() + digits.size(), value);
   if (error != std::errc() || end != digits.data() + digits.size() || !std::isfinite(value))
     refuse(whole, expected);
@@ -108,4 +108,4 @@ std::vector<RefinedRegion> parse_refinement(std::string_view text) {
   return regions;
 }
 
-} // namespace gewebe
+} // namespace gewebe::tetrahedra

@@ -8,7 +8,7 @@
 #include <string_view>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::tetrahedra {
 
 /// Where cells are at most `cell` mm large: in all of the bodies below at once.
 struct RefinedRegion {
@@ -28,4 +28,4 @@ struct RefinedRegion {
 /// surface or label:N. \throw Error that says what is wrong
 std::vector<RefinedRegion> parse_refinement(std::string_view text);
 
-} // namespace gewebe
+} // namespace gewebe::tetrahedra

@@ -4,7 +4,7 @@
 
 #include <string>
 
-namespace gewebe {
+namespace gewebe::tetrahedra {
 namespace {
 
 void check_size(const char* what, std::size_t size, std::size_t tetrahedra) {
@@ -56,4 +56,4 @@ void check_mesh(const TetMesh& mesh) {
                   std::to_string(mesh.material[t]) + ", expected 0 or more");
 }
 
-} // namespace gewebe
+} // namespace gewebe::tetrahedra

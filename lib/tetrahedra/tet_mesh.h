@@ -8,7 +8,7 @@
 #include <cstdint>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::tetrahedra {
 
 /// A tetrahedral mesh. Functions that require a checked mesh need positive volumes, (b - a) × (c -
 /// a) · (d - a) > 0. An optional array is either empty or has the size given here.
@@ -42,4 +42,4 @@ double volume(const TetMesh& mesh);
 /// the wrong size; the message names the first offender.
 void check_mesh(const TetMesh& mesh);
 
-} // namespace gewebe
+} // namespace gewebe::tetrahedra

@@ -8,7 +8,7 @@
 #include <cstddef>
 #include <string>
 
-namespace gewebe {
+namespace gewebe::text {
 
 /// The shortest text that reads back exactly, or where that is longer than `most` characters the
 /// one with the most digits that is not. \pre the value is finite, most >= 8
@@ -23,4 +23,4 @@ inline std::string limited_text(double value, std::size_t most) {
   return text;
 }
 
-} // namespace gewebe
+} // namespace gewebe::text

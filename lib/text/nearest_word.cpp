@@ -5,7 +5,7 @@
 #include <utility>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::text {
 namespace {
 
 /// Row by row of the table of distances between beginnings.
@@ -51,4 +51,4 @@ std::string suggestion(std::string_view word, std::span<const std::string> known
   return nearest.empty() ? "" : " (did you mean " + nearest + "?)";
 }
 
-} // namespace gewebe
+} // namespace gewebe::text

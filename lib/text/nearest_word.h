@@ -5,7 +5,7 @@
 #include <string>
 #include <string_view>
 
-namespace gewebe {
+namespace gewebe::text {
 
 /// The word of `known` that is nearest to `word`. The distance is the number of letters to insert,
 /// remove, replace or swap with their neighbour (optimal string alignment). It may be at most a
@@ -16,4 +16,4 @@ std::string nearest_word(std::string_view word, std::span<const std::string> kno
 /// " (did you mean WORD?)", or nothing.
 std::string suggestion(std::string_view word, std::span<const std::string> known);
 
-} // namespace gewebe
+} // namespace gewebe::text

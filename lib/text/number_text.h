@@ -6,7 +6,7 @@
 #include <string>
 #include <string_view>
 
-namespace gewebe {
+namespace gewebe::text {
 
 /// The shortest text that reads back exactly.
 inline std::string number_text(double value) {
@@ -37,4 +37,4 @@ constexpr std::string_view without_plus(std::string_view word) {
   return word.size() > 1 && word[0] == '+' && word[1] != '-' ? word.substr(1) : word;
 }
 
-} // namespace gewebe
+} // namespace gewebe::text

@@ -7,7 +7,7 @@
 #include <charconv>
 #include <cmath>
 
-namespace gewebe {
+namespace gewebe::text {
 namespace {
 
 /// The number with so many decimals, or with an exponent where it is long; -0 as 0.
@@ -68,4 +68,4 @@ double round_length(double most) {
   return std::stod(six_digits(factor * power));
 }
 
-} // namespace gewebe
+} // namespace gewebe::text

@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::text {
 
 /// Range of an axis, from one round number to another, and the numbers at its marks.
 struct RoundAxis {
@@ -23,4 +23,4 @@ RoundAxis round_axis(double min, double max, std::size_t count);
 /// positive.
 double round_length(double most);
 
-} // namespace gewebe
+} // namespace gewebe::text

@@ -7,7 +7,7 @@
 #include <charconv>
 #include <string>
 
-namespace gewebe {
+namespace gewebe::text {
 
 /// The number with three significant digits.
 inline std::string rounded_text(double value) {
@@ -18,4 +18,4 @@ inline std::string rounded_text(double value) {
   return number_text(value);
 }
 
-} // namespace gewebe
+} // namespace gewebe::text

@@ -4,7 +4,7 @@
 #include <cstddef>
 #include <string_view>
 
-namespace gewebe {
+namespace gewebe::text {
 
 /// Bytes of the UTF-8 character that a text begins with; 0 if it begins with none.
 inline std::size_t utf8_size(std::string_view text) {
@@ -26,4 +26,4 @@ inline std::size_t utf8_size(std::string_view text) {
   return surrogate || overlong || beyond ? 0 : size;
 }
 
-} // namespace gewebe
+} // namespace gewebe::text

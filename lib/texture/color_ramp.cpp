@@ -6,7 +6,7 @@
 #include <cmath>
 #include <cstddef>
 
-namespace gewebe {
+namespace gewebe::texture {
 
 namespace {
 
@@ -93,4 +93,4 @@ Image colored(std::span<const float> values, std::uint32_t width, std::uint32_t 
   return image;
 }
 
-} // namespace gewebe
+} // namespace gewebe::texture

@@ -10,7 +10,7 @@
 #include <string_view>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::texture {
 
 /// Colours at equal distances from the least value to the greatest, linear between them.
 struct ColorRamp {
@@ -34,4 +34,4 @@ std::array<double, 3> ramp_color(const ColorRamp& ramp, double share);
 Image colored(std::span<const float> values, std::uint32_t width, std::uint32_t height, double min,
               double max, const ColorRamp& ramp);
 
-} // namespace gewebe
+} // namespace gewebe::texture

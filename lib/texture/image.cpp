@@ -2,7 +2,7 @@
 
 #include "base/digest.h"
 
-namespace gewebe {
+namespace gewebe::texture {
 
 Image luminance(const Image& image) {
   if (image.channels == 1)
@@ -70,4 +70,4 @@ std::string image_digest(const Image& image) {
   return digest.hex();
 }
 
-} // namespace gewebe
+} // namespace gewebe::texture

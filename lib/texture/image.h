@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::texture {
 
 template <class Value>
 struct Pixels {
@@ -44,4 +44,4 @@ Image side_by_side(const std::vector<Image>& images);
 /// XXH3-64 of the values, 16 hexadecimal digits.
 std::string image_digest(const Image& image);
 
-} // namespace gewebe
+} // namespace gewebe::texture

@@ -7,7 +7,7 @@
 #include <algorithm>
 #include <cmath>
 
-namespace gewebe {
+namespace gewebe::texture {
 namespace {
 
 /// Sizes in px, from the picture's.
@@ -48,7 +48,7 @@ void draw_bar(Image& picture, const Layout& at, const LegendBar& bar) {
       color[c] = static_cast<std::uint8_t>(std::floor(mixed[c] + 0.5));
     fill_rectangle(picture, {left, top + row}, {right, top + row + 1}, color);
   }
-  const RoundAxis axis = round_axis(bar.range[0], bar.range[1], 5);
+  const text::RoundAxis axis = text::round_axis(bar.range[0], bar.range[1], 5);
   const double span = bar.range[1] - bar.range[0];
   for (std::size_t k = 0; k < axis.marks.size(); ++k) {
     const double share = (axis.marks[k] - bar.range[0]) / span;
@@ -63,7 +63,7 @@ void draw_bar(Image& picture, const Layout& at, const LegendBar& bar) {
 }
 
 void draw_scale(Image& picture, const Layout& at, double mm_per_pixel) {
-  const double length = round_length(0.25 * at.width * mm_per_pixel);
+  const double length = text::round_length(0.25 * at.width * mm_per_pixel);
   if (!(length > 0))
     return;
   const double pixels = length / mm_per_pixel, bottom = at.height - at.margin;
@@ -72,8 +72,8 @@ void draw_scale(Image& picture, const Layout& at, double mm_per_pixel) {
                  at.style.halo);
   fill_rectangle(picture, {at.margin, bottom - thick}, {at.margin + pixels, bottom},
                  at.style.color);
-  draw_lettering(picture, at.margin, bottom - thick - 0.7 * at.letter, number_text(length) + " mm",
-                 at.style);
+  draw_lettering(picture, at.margin, bottom - thick - 0.7 * at.letter,
+                 text::number_text(length) + " mm", at.style);
 }
 
 } // namespace
@@ -86,7 +86,7 @@ void draw_legend(Image& picture, const Legend& legend, const Vec3& background) {
     draw_scale(picture, layout, *legend.mm_per_pixel);
   if (legend.time)
     draw_lettering(picture, layout.margin, layout.margin + layout.letter,
-                   six_digits(*legend.time) + " s", layout.style);
+                   text::six_digits(*legend.time) + " s", layout.style);
 }
 
-} // namespace gewebe
+} // namespace gewebe::texture

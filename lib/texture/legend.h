@@ -10,7 +10,7 @@
 #include <optional>
 #include <string>
 
-namespace gewebe {
+namespace gewebe::texture {
 
 /// Pictures whose shorter side has fewer pixels have no room for a legend.
 constexpr std::uint32_t least_legend_side = 200;
@@ -33,4 +33,4 @@ struct Legend {
 /// background (0 … 1). \pre sides from least_legend_side, 3 channels
 void draw_legend(Image& picture, const Legend& legend, const Vec3& background);
 
-} // namespace gewebe
+} // namespace gewebe::texture

@@ -6,7 +6,7 @@
 #include <cmath>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::texture {
 
 namespace {
 
@@ -125,7 +125,7 @@ double height_of(char c) {
 
 /// Strokes of the character that the text begins with, which is taken away. The blank has none.
 std::string_view take_glyph(std::string_view& text) {
-  const std::size_t size = std::max<std::size_t>(utf8_size(text), 1);
+  const std::size_t size = std::max<std::size_t>(text::utf8_size(text), 1);
   const std::string_view character = text.substr(0, size);
   text.remove_prefix(size);
   const char c = character[0];
@@ -250,4 +250,4 @@ void fill_rectangle(Image& picture, const std::array<double, 2>& from,
       blend(picture, x, y, color, share(x, from[0], to[0]) * share(y, from[1], to[1]));
 }
 
-} // namespace gewebe
+} // namespace gewebe::texture

@@ -7,7 +7,7 @@
 #include <cstdint>
 #include <string_view>
 
-namespace gewebe {
+namespace gewebe::texture {
 
 using PixelColor = std::array<std::uint8_t, 3>;
 
@@ -30,4 +30,4 @@ void draw_lettering(Image& picture, double x, double y, std::string_view text,
 void fill_rectangle(Image& picture, const std::array<double, 2>& from,
                     const std::array<double, 2>& to, const PixelColor& color);
 
-} // namespace gewebe
+} // namespace gewebe::texture

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-namespace gewebe {
+namespace gewebe::texture {
 namespace {
 
 /// v rotated about the unit axis n by an angle of this cosine and sine (Rodrigues).
@@ -88,4 +88,4 @@ std::vector<DrawTurn> rest_turns(std::span<const Vec3> rest, std::span<const Vec
   return turns;
 }
 
-} // namespace gewebe
+} // namespace gewebe::texture

@@ -14,7 +14,7 @@
 #include <span>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::texture {
 
 /// The three projections of a texture have the coordinates of uv.h's box mapping, upright and
 /// unmirrored seen from outside: with q = (p - start) / edge at rest and n the normal there,
@@ -54,4 +54,4 @@ std::vector<DrawTurn> rest_turns(std::span<const Vec3> rest, std::span<const Vec
                                  std::span<const Vec3> now, std::span<const Vec3> normals,
                                  std::span<const Triangle> triangles);
 
-} // namespace gewebe
+} // namespace gewebe::texture

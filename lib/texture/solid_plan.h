@@ -3,7 +3,7 @@
 
 #include <cstdint>
 
-namespace gewebe {
+namespace gewebe::texture {
 
 enum class SolidKind : std::uint8_t { noise, veins };
 
@@ -29,4 +29,4 @@ struct SolidPlan {
 
 constexpr float vein_reach = 0.35F;
 
-} // namespace gewebe
+} // namespace gewebe::texture

@@ -9,7 +9,7 @@
 #include <string>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::texture {
 namespace {
 
 std::vector<std::string_view> split(std::string_view text, char at) {
@@ -160,4 +160,4 @@ SolidPlan solid_plan(const SolidTexture& texture, const Vec3& origin, double uni
   return plan;
 }
 
-} // namespace gewebe
+} // namespace gewebe::texture

@@ -14,7 +14,7 @@
 #include <optional>
 #include <string_view>
 
-namespace gewebe {
+namespace gewebe::texture {
 
 /// With p in mm at rest, y = Q p / scale in cells, where Q is the rotation of the quaternion
 /// (5; 2, 3, 1) / sqrt(39), so that no plane of a body coincides with one of the lattice:
@@ -64,4 +64,4 @@ bool is_solid_texture(std::string_view text);
 /// For places q = (p - origin) / unit. \pre scale is set; unit > 0
 SolidPlan solid_plan(const SolidTexture& texture, const Vec3& origin, double unit);
 
-} // namespace gewebe
+} // namespace gewebe::texture

@@ -15,7 +15,7 @@
 #include <optional>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::texture {
 
 /// Absent textures are neither read nor computed with: without base the colour alone, without
 /// structure r = 0.5, which leaves the base as it is.
@@ -86,4 +86,4 @@ inline std::array<std::uint8_t, 3> stored(const Vec3& color) {
   return {stored(color.x), stored(color.y), stored(color.z)};
 }
 
-} // namespace gewebe
+} // namespace gewebe::texture

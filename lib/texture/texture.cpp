@@ -6,7 +6,7 @@
 #include <cmath>
 #include <utility>
 
-namespace gewebe {
+namespace gewebe::texture {
 namespace {
 
 /// Pixels as they are halved: `channels` values each, rows from the bottom.
@@ -165,4 +165,4 @@ std::array<double, 3> sample(const Texture& texture, double s, double t) {
   return value;
 }
 
-} // namespace gewebe
+} // namespace gewebe::texture

@@ -11,7 +11,7 @@
 #include <string_view>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::texture {
 
 enum class TextureFilter : std::uint8_t {
   nearest,
@@ -68,4 +68,4 @@ std::array<double, 3> sample(const Texture& texture, double s, double t);
 std::array<double, 3> texel(const Texture& texture, std::size_t level, std::uint32_t x,
                             std::uint32_t y);
 
-} // namespace gewebe
+} // namespace gewebe::texture

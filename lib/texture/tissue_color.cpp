@@ -6,7 +6,7 @@
 #include <utility>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::texture {
 namespace {
 
 constexpr std::array<std::pair<std::string_view, Vec3>, 4> named{{
@@ -89,4 +89,4 @@ std::map<std::int32_t, Vec3> tissue_colors(const TriangleMesh& mesh,
   return colors;
 }
 
-} // namespace gewebe
+} // namespace gewebe::texture

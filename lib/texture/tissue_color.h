@@ -11,7 +11,7 @@
 #include <string>
 #include <string_view>
 
-namespace gewebe {
+namespace gewebe::texture {
 
 /// The colour, 0 … 1, of the material `number` of a model: that of its name, where it is one of the
 /// presets (model/material.h), else one of eight that numbers have in turn. A choice: organs in
@@ -24,4 +24,4 @@ Vec3 tissue_color(std::string_view name, std::size_t number);
 std::map<std::int32_t, Vec3> tissue_colors(const TriangleMesh& mesh,
                                            std::span<const std::string> names);
 
-} // namespace gewebe
+} // namespace gewebe::texture

@@ -1,7 +1,7 @@
 #pragma once
 // What a thin film of water on a surface mirrors, or a polished instrument.
 
-namespace gewebe {
+namespace gewebe::texture {
 
 /// ((n - 1) / (n + 1))² for the refractive index n = 1.336 of the body's fluids.
 inline constexpr double water_reflectance = (0.336 / 2.336) * (0.336 / 2.336);
@@ -24,4 +24,4 @@ struct WetFilm {
   double reflectance = water_reflectance; ///< F0
 };
 
-} // namespace gewebe
+} // namespace gewebe::texture

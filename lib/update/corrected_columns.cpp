@@ -10,7 +10,7 @@
 #include <string>
 #include <utility>
 
-namespace gewebe {
+namespace gewebe::update {
 
 namespace {
 
@@ -34,7 +34,7 @@ std::vector<double> packed(const std::vector<double>& columns, std::size_t rows,
 
 } // namespace
 
-CorrectedColumns::CorrectedColumns(std::shared_ptr<const ColumnSource> before,
+CorrectedColumns::CorrectedColumns(std::shared_ptr<const columns::ColumnSource> before,
                                    StiffnessChange change, AxesSolve solve, const Context& context,
                                    AxesSolve solve_before, std::size_t solve_entries)
     : before_(std::move(before)), change_(std::move(change)), solve_(std::move(solve)),
@@ -59,8 +59,8 @@ CorrectedColumns::CorrectedColumns(std::shared_ptr<const ColumnSource> before,
 bool CorrectedColumns::pays(std::size_t count) const {
   const int responses = warm_ ? 0 : solve_before_ ? 2 : 1;
   return count > 0 && (solve_entries_ == 0 ||
-                       costs::correcting_columns_pays(3 * count, change_.new_axes, solve_entries_,
-                                                      change_.rank(), responses));
+                       columns::costs::correcting_columns_pays(
+                           3 * count, change_.new_axes, solve_entries_, change_.rank(), responses));
 }
 
 void CorrectedColumns::prepare() const {
@@ -111,7 +111,7 @@ void CorrectedColumns::read(std::size_t first, std::size_t count, std::span<doub
   if (rank == 0)
     return;
   Context some = context_;
-  if (3 * count * rank * axes < costs::worth_threads)
+  if (3 * count * rank * axes < columns::costs::worth_threads)
     some.threads = 1;
   const ResponseSum sum = response_sum(context_.cpu);
   parallel_blocks(some, axes, rows_at_once, [&](std::size_t begin, std::size_t end) {
@@ -128,8 +128,8 @@ void CorrectedColumns::read_single(std::size_t k, std::span<float> out) const {
     out[r] = static_cast<float>(wide[r]);
 }
 
-EntryBound CorrectedColumns::bound() const {
-  EntryBound bound = before_->bound();
+columns::EntryBound CorrectedColumns::bound() const {
+  columns::EntryBound bound = before_->bound();
   if (bound.entry > 0)
     bound.entry *= error_gain();
   return bound;
@@ -151,4 +151,4 @@ double CorrectedColumns::error_gain() const {
   return *std::max_element(gain.begin(), gain.end());
 }
 
-} // namespace gewebe
+} // namespace gewebe::update

@@ -12,9 +12,9 @@
 #include <span>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::update {
 
-class CorrectedColumns final : public ColumnSource {
+class CorrectedColumns final : public columns::ColumnSource {
 public:
   /// Does no work: the responses are solved for when a column is first read, with `solve` of the
   /// later K' (rank() solves). Remaining nodes that had columns have them, and so have their
@@ -27,7 +27,7 @@ public:
   /// always
   /// pays
   /// \throw Error if the columns are of another number of nodes
-  CorrectedColumns(std::shared_ptr<const ColumnSource> before, StiffnessChange change,
+  CorrectedColumns(std::shared_ptr<const columns::ColumnSource> before, StiffnessChange change,
                    AxesSolve solve, const Context& context, AxesSolve solve_before = {},
                    std::size_t solve_entries = 0);
 
@@ -40,7 +40,7 @@ public:
   bool pays(std::size_t count) const override;
   void read_single(std::size_t k, std::span<float> out) const override;
   /// Bound of the earlier columns, times error_gain(). Solves if nothing was read yet.
-  EntryBound bound() const override;
+  columns::EntryBound bound() const override;
 
   /// As read, for nodes first to first + count - 1, node by node: faster than one by one,
   /// with the same bytes. \pre out.size() == 9 n count
@@ -57,7 +57,7 @@ public:
 private:
   void prepare() const;
 
-  std::shared_ptr<const ColumnSource> before_;
+  std::shared_ptr<const columns::ColumnSource> before_;
   StiffnessChange change_;
   AxesSolve solve_, solve_before_;
   std::size_t solve_entries_ = 0;
@@ -69,4 +69,4 @@ private:
   mutable std::vector<double> answers_;  ///< C Q, [rank][3 n], if solve_before is given
 };
 
-} // namespace gewebe
+} // namespace gewebe::update

@@ -10,13 +10,13 @@
 #include <span>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::update {
 
 namespace {
 
 class Blocks {
 public:
-  Blocks(const StiffnessMatrix& matrix, const AxisSolver& solver, double norm)
+  Blocks(const linalg::StiffnessMatrix& matrix, const compliance::AxisSolver& solver, double norm)
       : matrix_(matrix), solver_(solver), norm_(norm) {}
 
   /// Backward error of a sum of the columns of these nodes.
@@ -31,7 +31,7 @@ public:
       for (std::size_t r = 0; r < order; ++r)
         sum[r] += weight * columns[c * axes + static_cast<std::size_t>(matrix_.axis_of_row[r])];
     }
-    return backward_error(matrix_, norm_, sum, load);
+    return linalg::backward_error(matrix_, norm_, sum, load);
   }
 
   void solve(std::span<const std::uint32_t> nodes, std::span<double> columns) const {
@@ -43,31 +43,33 @@ public:
   }
 
 private:
-  const StiffnessMatrix& matrix_;
-  const AxisSolver& solver_;
+  const linalg::StiffnessMatrix& matrix_;
+  const compliance::AxisSolver& solver_;
   double norm_;
 };
 
 } // namespace
 
-CorrectedCompliance corrected_compliance(const StiffnessMatrix& matrix, const AxisSolver& solver,
-                                         double norm, const CorrectedColumns& columns,
-                                         const Context& context, ColumnSink& sink) {
+CorrectedCompliance corrected_compliance(const linalg::StiffnessMatrix& matrix,
+                                         const compliance::AxisSolver& solver, double norm,
+                                         const CorrectedColumns& columns, const Context& context,
+                                         columns::ColumnSink& sink) {
   const std::span<const std::uint32_t> nodes = columns.nodes();
   CorrectedCompliance result;
   if (!columns.pays(nodes.size())) {
-    result.residual = compliance_columns(matrix, solver.factor, norm, nodes, context, sink);
+    result.residual =
+        columns::compliance_columns(matrix, solver.factor, norm, nodes, context, sink);
     return result;
   }
   const double max = columns.single() ? static_cast<double>(std::numeric_limits<float>::epsilon())
-                                      : max_backward_error;
+                                      : linalg::max_backward_error;
   const Blocks blocks(matrix, solver, norm);
   const std::size_t each = 3 * matrix.row_of_axis.size();
-  std::vector<double> kept(each * compliance_block);
-  for (std::size_t first = 0; first < nodes.size(); first += compliance_block) {
+  std::vector<double> kept(each * columns::compliance_block);
+  for (std::size_t first = 0; first < nodes.size(); first += columns::compliance_block) {
     if (context.cancelled && context.cancelled())
       throw Cancelled();
-    const std::size_t count = std::min(compliance_block, nodes.size() - first);
+    const std::size_t count = std::min(columns::compliance_block, nodes.size() - first);
     const auto some = nodes.subspan(first, count);
     const auto block = std::span(kept).first(each * count);
     columns.read(first, count, block);
@@ -77,7 +79,7 @@ CorrectedCompliance corrected_compliance(const StiffnessMatrix& matrix, const Ax
     } else {
       blocks.solve(some, block);
       error = blocks.residual(some, block);
-      if (!(error <= max_backward_error))
+      if (!(error <= linalg::max_backward_error))
         throw Error("a column has a backward error beyond 1e-14");
     }
     result.residual = std::max(result.residual, error);
@@ -89,4 +91,4 @@ CorrectedCompliance corrected_compliance(const StiffnessMatrix& matrix, const Ax
   return result;
 }
 
-} // namespace gewebe
+} // namespace gewebe::update

@@ -10,7 +10,7 @@
 
 #include <cstddef>
 
-namespace gewebe {
+namespace gewebe::update {
 
 /// Work and accuracy of corrected_compliance.
 struct CorrectedCompliance {
@@ -28,8 +28,9 @@ struct CorrectedCompliance {
 /// \pre the columns are corrected to this model
 /// \throw Error if a block that was solved for has a backward error beyond max_backward_error; the
 /// exceptions of the columns, the solver and the sink; Cancelled
-CorrectedCompliance corrected_compliance(const StiffnessMatrix& matrix, const AxisSolver& solver,
-                                         double norm, const CorrectedColumns& columns,
-                                         const Context& context, ColumnSink& sink);
+CorrectedCompliance corrected_compliance(const linalg::StiffnessMatrix& matrix,
+                                         const compliance::AxisSolver& solver, double norm,
+                                         const CorrectedColumns& columns, const Context& context,
+                                         columns::ColumnSink& sink);
 
-} // namespace gewebe
+} // namespace gewebe::update

@@ -15,7 +15,7 @@
 #include <numeric>
 #include <utility>
 
-namespace gewebe {
+namespace gewebe::update {
 
 namespace {
 
@@ -39,7 +39,7 @@ void follow(std::vector<std::uint32_t>& origin, std::vector<std::uint32_t>& plac
   for (const std::uint32_t node : next_origin)
     from.push_back(origin[node]);
   for (std::uint32_t& node : place)
-    if (node != CutModel::gone)
+    if (node != cutting::CutModel::gone)
       node = next_place[node];
   origin = std::move(from);
 }
@@ -56,28 +56,28 @@ constexpr const char* nearly_singular =
     "the stiffness matrix is nearly singular, expected more that holds the object";
 
 /// \throw SingularStiffness if K is, naming what moves
-void tell_what_moves(const Model& model, const Context& context) {
-  const StiffnessMatrix matrix = stiffness_matrix(model);
-  StiffnessCheck check;
-  (void)checked_factor(model, matrix, context, check);
+void tell_what_moves(const model::Model& model, const Context& context) {
+  const linalg::StiffnessMatrix matrix = fem::stiffness_matrix(model);
+  linalg::StiffnessCheck check;
+  (void)linalg::checked_factor(model, matrix, context, check);
 }
 
 /// The factor of a cut model, or one before that is corrected; columns of the first model, to be
 /// corrected; blocks where the factor is that of the model.
-class CutSource final : public ComplianceSource {
+class CutSource final : public compliance::ComplianceSource {
 public:
-  CutSource(AxesSolve solve, std::size_t entries, std::unique_ptr<ForwardBlocks> blocks,
+  CutSource(AxesSolve solve, std::size_t entries, std::unique_ptr<compliance::ForwardBlocks> blocks,
             std::unique_ptr<CorrectedColumns> columns)
       : solve_(std::move(solve)), entries_(entries), blocks_(std::move(blocks)),
         columns_(std::move(columns)) {}
 
-  void open(const Model&, const Context&) override {}
+  void open(const model::Model&, const Context&) override {}
   void solve(std::span<double> over_axes, std::size_t columns) override {
     solve_(over_axes, columns);
   }
   std::size_t entries() const override { return entries_; }
-  const ColumnSource* columns() const override { return columns_.get(); }
-  ForwardBlocks* blocks() override { return blocks_.get(); }
+  const columns::ColumnSource* columns() const override { return columns_.get(); }
+  compliance::ForwardBlocks* blocks() override { return blocks_.get(); }
   bool is_warm() const override { return columns_ != nullptr && columns_->is_warm(); }
   void set_warm(bool warm) override {
     if (columns_ != nullptr)
@@ -87,14 +87,15 @@ public:
 private:
   AxesSolve solve_;
   std::size_t entries_;
-  std::unique_ptr<ForwardBlocks> blocks_;
+  std::unique_ptr<compliance::ForwardBlocks> blocks_;
   std::unique_ptr<CorrectedColumns> columns_;
 };
 
 } // namespace
 
-CutStiffness::CutStiffness(std::shared_ptr<const Model> first,
-                           std::shared_ptr<const ComplianceSource> source, const Context& context)
+CutStiffness::CutStiffness(std::shared_ptr<const model::Model> first,
+                           std::shared_ptr<const compliance::ComplianceSource> source,
+                           const Context& context)
     : first_(std::move(first)), now_(first_), source_(std::move(source)), context_(context),
       first_origin_(identity(first_->nodes.size())), first_place_(first_origin_) {
   context_.progress = nullptr;
@@ -104,7 +105,7 @@ CutStiffness::CutStiffness(std::shared_ptr<const Model> first,
 /// its axis then shows how far the free part moves. If that is far, the norm of C is estimated.
 /// \throw SingularStiffness if the condition is too large
 void CutStiffness::require_condition() {
-  const FrontalFactor& factor = factor_->factor();
+  const linalg::FrontalFactor& factor = factor_->factor();
   const double weakest = factor.weakest_pivot(), norm = factor_->norm();
   if (weakest > weak_pivot || weakest > 0.5 * accepted_pivot_)
     return;
@@ -115,12 +116,12 @@ void CutStiffness::require_condition() {
   double size = 0;
   for (const double value : column)
     size += std::abs(value);
-  if (!(norm * size < max_condition / column_margin)) {
-    size = inverse_norm(axes, [&](std::span<const double> x, std::span<double> y) {
+  if (!(norm * size < linalg::max_condition / column_margin)) {
+    size = linalg::inverse_norm(axes, [&](std::span<const double> x, std::span<double> y) {
       std::copy(x.begin(), x.end(), y.begin());
       factor.solve(y);
     });
-    if (!(norm * size < max_condition / estimate_margin))
+    if (!(norm * size < linalg::max_condition / estimate_margin))
       tell_what_moves(*now_, context_);
   }
   accepted_pivot_ = weakest;
@@ -131,10 +132,10 @@ void CutStiffness::factorise(const std::function<std::shared_ptr<const FollowedF
   try {
     factor_ = work();
     require_condition();
-  } catch (const NotPositiveDefinite&) {
+  } catch (const linalg::NotPositiveDefinite&) {
     factor_.reset();
     tell_what_moves(*now_, context_);
-    throw SingularStiffness(nearly_singular);
+    throw linalg::SingularStiffness(nearly_singular);
   } catch (...) {
     factor_.reset();
     throw;
@@ -151,14 +152,15 @@ void CutStiffness::prepare() {
 }
 
 bool CutStiffness::woodbury_pays(std::size_t rank) const {
-  return costs::woodbury_pays({.nodes = now_->nodes.size(),
-                               .rank = rank,
-                               .entries = factor_->entries(),
-                               .all_operations = factor_->work().all_operations,
-                               .reached = reached_});
+  return columns::costs::woodbury_pays({.nodes = now_->nodes.size(),
+                                        .rank = rank,
+                                        .entries = factor_->entries(),
+                                        .all_operations = factor_->work().all_operations,
+                                        .reached = reached_});
 }
 
-CutWork CutStiffness::cut(std::shared_ptr<const Model> next, std::span<const std::uint32_t> origin,
+CutWork CutStiffness::cut(std::shared_ptr<const model::Model> next,
+                          std::span<const std::uint32_t> origin,
                           std::span<const std::uint32_t> place, std::optional<CutWay> way) {
   CutWork work;
   work.unprepared = factor_ == nullptr;
@@ -167,7 +169,8 @@ CutWork CutStiffness::cut(std::shared_ptr<const Model> next, std::span<const std
   now_ = std::move(next);
   if (way != CutWay::fresh) {
     follow(origin_, place_, origin, place);
-    const bool some_gone = std::find(place_.begin(), place_.end(), CutModel::gone) != place_.end();
+    const bool some_gone =
+        std::find(place_.begin(), place_.end(), cutting::CutModel::gone) != place_.end();
     work.rank = 3 * copies(origin_, place_);
     std::optional<StiffnessChange> change;
     const bool is_solid = !now_->tetrahedra.empty();
@@ -196,7 +199,7 @@ CutWork CutStiffness::cut(std::shared_ptr<const Model> next, std::span<const std
       }
     }
     woodbury_.reset();
-    if (!costs::order_is_worn_out(factor_->work().all_operations, fresh_operations_)) {
+    if (!columns::costs::order_is_worn_out(factor_->work().all_operations, fresh_operations_)) {
       factorise([&, before = factor_] { return before->follow(now_, origin_, place_, context_); });
       work.factor = factor_->work();
       work.way = CutWay::refactor;
@@ -221,23 +224,23 @@ AxesSolve CutStiffness::solver() const {
   };
 }
 
-std::shared_ptr<ComplianceSource> CutStiffness::compliance() const {
+std::shared_ptr<compliance::ComplianceSource> CutStiffness::compliance() const {
   AxesSolve solve = solver();
   std::size_t entries = factor_->entries();
-  std::unique_ptr<ForwardBlocks> blocks;
+  std::unique_ptr<compliance::ForwardBlocks> blocks;
   if (woodbury_ == nullptr)
-    blocks = std::make_unique<ForwardBlocks>(
-        [factor = factor_]() -> FrontalFactor& { return factor->factor(); });
+    blocks = std::make_unique<compliance::ForwardBlocks>(
+        [factor = factor_]() -> linalg::FrontalFactor& { return factor->factor(); });
   else
     entries += woodbury_->change().rank() * factor_->axes();
   std::unique_ptr<CorrectedColumns> columns;
   if (now_->tetrahedra.empty() && source_ != nullptr && source_->columns() != nullptr)
     columns = std::make_unique<CorrectedColumns>(
-        std::shared_ptr<const ColumnSource>(source_, source_->columns()),
+        std::shared_ptr<const columns::ColumnSource>(source_, source_->columns()),
         stiffness_change(*first_, *now_, first_origin_, first_place_), solve, context_, AxesSolve{},
         entries);
   return std::make_shared<CutSource>(std::move(solve), entries, std::move(blocks),
                                      std::move(columns));
 }
 
-} // namespace gewebe
+} // namespace gewebe::update

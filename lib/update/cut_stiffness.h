@@ -19,7 +19,7 @@
 #include <span>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::update {
 
 /// Method that updates the stiffness after a cut.
 enum class CutWay : std::uint8_t {
@@ -31,9 +31,9 @@ enum class CutWay : std::uint8_t {
 /// Work of an update.
 struct CutWork {
   CutWay way = CutWay::fresh;
-  bool unprepared = false; ///< the previous model had to be factorised first
-  std::size_t rank = 0;    ///< for Woodbury, all cuts since the factor counted
-  FrontalWork factor;      ///< of refactor and fresh
+  bool unprepared = false;      ///< the previous model had to be factorised first
+  std::size_t rank = 0;         ///< for Woodbury, all cuts since the factor counted
+  cholesky::FrontalWork factor; ///< of refactor and fresh
 };
 
 /// Factor of a model and its cuts.
@@ -41,8 +41,8 @@ class CutStiffness {
 public:
   /// Starts with a model that has not been cut.
   /// \param source  of its compliance, whose columns remain in use; or null
-  CutStiffness(std::shared_ptr<const Model> first, std::shared_ptr<const ComplianceSource> source,
-               const Context& context);
+  CutStiffness(std::shared_ptr<const model::Model> first,
+               std::shared_ptr<const compliance::ComplianceSource> source, const Context& context);
 
   /// Factorises the present model in advance of the next cut. \throw as FrontalFactor
   void prepare();
@@ -53,20 +53,20 @@ public:
   /// \param way  the method; empty: the cheapest
   /// \throw SingularStiffness that names the free nodes; as FrontalFactor. The object is then
   /// unusable, its copies are not
-  CutWork cut(std::shared_ptr<const Model> next, std::span<const std::uint32_t> origin,
+  CutWork cut(std::shared_ptr<const model::Model> next, std::span<const std::uint32_t> origin,
               std::span<const std::uint32_t> place, std::optional<CutWay> way = {});
 
   /// Compliance of the present model.
   /// \pre cut() or prepare() was called
-  std::shared_ptr<ComplianceSource> compliance() const;
+  std::shared_ptr<compliance::ComplianceSource> compliance() const;
 
 private:
   bool woodbury_pays(std::size_t rank) const;
   AxesSolve solver() const;
   void require_condition();
   void factorise(const std::function<std::shared_ptr<const FollowedFactor>()>& work);
-  std::shared_ptr<const Model> first_, now_;
-  std::shared_ptr<const ComplianceSource> source_;
+  std::shared_ptr<const model::Model> first_, now_;
+  std::shared_ptr<const compliance::ComplianceSource> source_;
   Context context_;
   std::vector<std::uint32_t> first_origin_, first_place_; ///< from first_ to now_
   std::vector<std::uint32_t> origin_, place_;             ///< from the factor's model to now_
@@ -77,4 +77,4 @@ private:
   double accepted_pivot_ = 1;   ///< smallest pivot for which the condition was small enough
 };
 
-} // namespace gewebe
+} // namespace gewebe::update

@@ -12,16 +12,16 @@
 #include <utility>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::update {
 
 namespace {
 
 /// A bound of ‖K‖₁. Cuts leave no spring stiffer than it was.
-double stiffness_bound(const Model& model) {
+double stiffness_bound(const model::Model& model) {
   std::vector<double> sum(model.nodes.size());
   double max = 0;
-  for (const Spring& s : model.springs) {
-    const SymmetricBlock b = stiffness_block(model, s);
+  for (const model::Spring& s : model.springs) {
+    const linalg::SymmetricBlock b = linalg::stiffness_block(model, s);
     const double largest = std::max({std::abs(b[0]) + std::abs(b[1]) + std::abs(b[2]),
                                      std::abs(b[1]) + std::abs(b[3]) + std::abs(b[4]),
                                      std::abs(b[2]) + std::abs(b[4]) + std::abs(b[5])});
@@ -33,7 +33,7 @@ double stiffness_bound(const Model& model) {
   return max;
 }
 
-bool is_solid(const Model& model) {
+bool is_solid(const model::Model& model) {
   return !model.tetrahedra.empty();
 }
 
@@ -50,12 +50,12 @@ bool stays(std::span<const std::uint32_t> place) {
 struct FollowedFactor::Place {
   std::mutex mutex;
   std::uint64_t number = 0; ///< of that factor; 0: none
-  std::optional<FrontalFactor> factor;
-  NodeMatrix matrix;            ///< of a solid
+  std::optional<linalg::FrontalFactor> factor;
+  linalg::NodeMatrix matrix;    ///< of a solid
   std::vector<double> row_norm; ///< of its nodes
 
   /// Writes K of a solid. \param rows  that differ; empty: all of them \return ‖K‖₁
-  double assemble(const Model& model, const std::vector<std::uint32_t>* rows) {
+  double assemble(const model::Model& model, const std::vector<std::uint32_t>* rows) {
     if (rows != nullptr)
       update_node_stiffness(matrix, model, *rows);
     else
@@ -63,13 +63,13 @@ struct FollowedFactor::Place {
     row_norm.resize(matrix.nodes());
     if (rows != nullptr)
       for (const std::uint32_t row : *rows)
-        row_norm[row] = gewebe::row_norm(matrix, row);
+        row_norm[row] = gewebe::update::row_norm(matrix, row);
     else
       for (std::uint32_t row = 0; row < matrix.nodes(); ++row)
-        row_norm[row] = gewebe::row_norm(matrix, row);
+        row_norm[row] = gewebe::update::row_norm(matrix, row);
     double norm = 0;
     for (const double of_row : row_norm)
-      norm = larger(norm, of_row);
+      norm = numeric::larger(norm, of_row);
     return norm;
   }
 };
@@ -81,7 +81,7 @@ void FollowedFactor::note() {
   number_ = at_->number = unique_number();
 }
 
-FollowedFactor::FollowedFactor(std::shared_ptr<const Model> model, const Context& context)
+FollowedFactor::FollowedFactor(std::shared_ptr<const model::Model> model, const Context& context)
     : at_(std::make_shared<Place>()), model_(std::move(model)), context_(context) {
   if (is_solid(*model_)) {
     norm_ = at_->assemble(*model_, nullptr);
@@ -93,7 +93,7 @@ FollowedFactor::FollowedFactor(std::shared_ptr<const Model> model, const Context
   note();
 }
 
-FrontalFactor& FollowedFactor::factor() const {
+linalg::FrontalFactor& FollowedFactor::factor() const {
   const std::lock_guard lock(at_->mutex);
   if (at_->number == number_)
     return *at_->factor;
@@ -108,11 +108,11 @@ FrontalFactor& FollowedFactor::factor() const {
   return *at_->factor;
 }
 
-std::shared_ptr<const FollowedFactor> FollowedFactor::follow(std::shared_ptr<const Model> next,
-                                                             std::span<const std::uint32_t> origin,
-                                                             std::span<const std::uint32_t> place,
-                                                             const Context& context) const {
-  FrontalFactor& factor = this->factor();
+std::shared_ptr<const FollowedFactor>
+FollowedFactor::follow(std::shared_ptr<const model::Model> next,
+                       std::span<const std::uint32_t> origin, std::span<const std::uint32_t> place,
+                       const Context& context) const {
+  linalg::FrontalFactor& factor = this->factor();
   std::shared_ptr<FollowedFactor> now(new FollowedFactor());
   now->at_ = at_;
   now->model_ = std::move(next);
@@ -130,4 +130,4 @@ std::shared_ptr<const FollowedFactor> FollowedFactor::follow(std::shared_ptr<con
   return now;
 }
 
-} // namespace gewebe
+} // namespace gewebe::update

@@ -12,26 +12,26 @@
 #include <memory>
 #include <span>
 
-namespace gewebe {
+namespace gewebe::update {
 
 /// Factor of one model. All that follow from one another share one place in memory.
 class FollowedFactor {
 public:
   /// Factor with a tree of its own. \throw as FrontalFactor
-  FollowedFactor(std::shared_ptr<const Model> model, const Context& context);
+  FollowedFactor(std::shared_ptr<const model::Model> model, const Context& context);
 
   /// Factor of the next model, in the place of this one. \param origin, place  as CutModel
   /// \throw as FrontalFactor
-  std::shared_ptr<const FollowedFactor> follow(std::shared_ptr<const Model> next,
+  std::shared_ptr<const FollowedFactor> follow(std::shared_ptr<const model::Model> next,
                                                std::span<const std::uint32_t> origin,
                                                std::span<const std::uint32_t> place,
                                                const Context& context) const;
 
   /// Safe from many threads at once. It is valid until another factor of the same place is read.
   /// \throw as FrontalFactor
-  FrontalFactor& factor() const;
-  const Model& model() const noexcept { return *model_; }
-  const FrontalWork& work() const noexcept { return work_; } ///< of its first computation
+  linalg::FrontalFactor& factor() const;
+  const model::Model& model() const noexcept { return *model_; }
+  const cholesky::FrontalWork& work() const noexcept { return work_; } ///< of its first computation
   std::size_t entries() const noexcept { return entries_; }
   std::size_t axes() const noexcept { return 3 * model_->nodes.size(); }
   double norm() const noexcept { return norm_; } ///< bound of ‖K‖₁
@@ -42,13 +42,13 @@ private:
   void note();
 
   std::shared_ptr<Place> at_;
-  std::shared_ptr<const Model> model_;
-  FrontTree tree_;
+  std::shared_ptr<const model::Model> model_;
+  cholesky::FrontTree tree_;
   Context context_;
   std::uint64_t number_ = 0; ///< see base/unique_number.h
-  FrontalWork work_{};
+  cholesky::FrontalWork work_{};
   std::size_t entries_ = 0;
   double norm_ = 0;
 };
 
-} // namespace gewebe
+} // namespace gewebe::update

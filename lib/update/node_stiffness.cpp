@@ -14,22 +14,22 @@
 #include <set>
 #include <utility>
 
-namespace gewebe {
+namespace gewebe::update {
 namespace {
 
 constexpr std::uint32_t none = UINT32_MAX;
 
-std::size_t nodes_of(const Model& model) {
+std::size_t nodes_of(const model::Model& model) {
   return model.middles.empty() ? 4 : 10;
 }
-std::uint32_t node_of(const Model& model, std::size_t t, std::size_t a) {
+std::uint32_t node_of(const model::Model& model, std::size_t t, std::size_t a) {
   return a < 4 ? model.tetrahedra[t][a] : model.middles[t][a - 4];
 }
 
 /// Rows of some nodes.
 class Rows {
 public:
-  Rows(const Model& model, std::span<const std::uint32_t> rows)
+  Rows(const model::Model& model, std::span<const std::uint32_t> rows)
       : model_(model), rows_(rows), row_of_(model.nodes.size(), none) {
     for (std::uint32_t r = 0; r < rows.size(); ++r)
       row_of_[rows[r]] = r;
@@ -37,7 +37,7 @@ public:
   }
 
   /// Appends those of the node, with their blocks.
-  void write(std::uint32_t node, NodeMatrix& matrix) {
+  void write(std::uint32_t node, linalg::NodeMatrix& matrix) {
     const std::uint32_t r = row_of_[node];
     const std::size_t count = nodes_of(model_);
     near_.clear();
@@ -51,12 +51,12 @@ public:
     near_.erase(repeated.begin(), repeated.end());
     const std::size_t begin = matrix.block.size();
     matrix.block.resize(begin + near_.size());
-    SymmetricBlock& diagonal = matrix.diagonal[node] = {};
+    linalg::SymmetricBlock& diagonal = matrix.diagonal[node] = {};
     for (std::size_t k = first_[r]; k < first_[r + 1]; ++k) {
       const std::size_t e = uses_[k] / 10, a = uses_[k] % 10;
       for (std::size_t b = 0; b < count; ++b) {
-        const SolidBlock part =
-            count == 4 ? linear_block(element_[e], a, b) : quadratic_block(element_[e], a, b);
+        const fem::SolidBlock part = count == 4 ? fem::linear_block(element_[e], a, b)
+                                                : fem::quadratic_block(element_[e], a, b);
         if (b == a) {
           constexpr std::array<std::size_t, 6> upper{0, 1, 2, 4, 5, 8};
           for (std::size_t n = 0; n < 6; ++n)
@@ -79,10 +79,10 @@ public:
 private:
   /// Those that have one of the nodes, ascending.
   void find_elements() {
-    const std::vector<SolidMaterial> materials = element_materials(model_);
-    std::vector<Elasticity> elasticities;
-    for (const SolidMaterial& m : materials)
-      elasticities.push_back(elasticity(m.young, m.poisson));
+    const std::vector<fem::SolidMaterial> materials = fem::element_materials(model_);
+    std::vector<fem::Elasticity> elasticities;
+    for (const fem::SolidMaterial& m : materials)
+      elasticities.push_back(fem::elasticity(m.young, m.poisson));
     const std::size_t count = nodes_of(model_);
     first_.assign(rows_.size() + 1, 0);
     for (std::uint32_t t = 0; t < model_.tetrahedra.size(); ++t) {
@@ -98,7 +98,7 @@ private:
       std::array<Vec3, 4> corners;
       for (std::size_t k = 0; k < 4; ++k)
         corners[k] = model_.nodes[model_.tetrahedra[t][k]].position;
-      element_.push_back(solid_element(
+      element_.push_back(fem::solid_element(
           corners, elasticities[static_cast<std::size_t>(model_.tetrahedron_material[t])]));
     }
     std::partial_sum(first_.begin(), first_.end(), first_.begin());
@@ -110,16 +110,16 @@ private:
           uses_[next[r]++] = 10 * e + a;
   }
 
-  const Model& model_;
+  const model::Model& model_;
   std::span<const std::uint32_t> rows_;
   std::vector<std::uint32_t> row_of_; // by node: which of the rows, or none
   std::vector<std::uint32_t> tetrahedron_;
-  std::vector<SolidElement> element_;
+  std::vector<fem::SolidElement> element_;
   std::vector<std::size_t> first_, uses_; // of each row: 10 e + a
   std::vector<std::uint32_t> near_;
 };
 
-void write_axes(const Model& model, NodeMatrix& matrix) {
+void write_axes(const model::Model& model, linalg::NodeMatrix& matrix) {
   matrix.fixed.resize(model.nodes.size());
   matrix.axes.resize(model.nodes.size());
   for (std::size_t i = 0; i < model.nodes.size(); ++i) {
@@ -132,18 +132,18 @@ void write_axes(const Model& model, NodeMatrix& matrix) {
 
 } // namespace
 
-NodeMatrix node_stiffness(const Model& model) {
-  NodeMatrix matrix;
+linalg::NodeMatrix node_stiffness(const model::Model& model) {
+  linalg::NodeMatrix matrix;
   std::vector<std::uint32_t> all(model.nodes.size());
   std::iota(all.begin(), all.end(), 0U);
   update_node_stiffness(matrix, model, all);
   return matrix;
 }
 
-void update_node_stiffness(NodeMatrix& matrix, const Model& model,
+void update_node_stiffness(linalg::NodeMatrix& matrix, const model::Model& model,
                            std::span<const std::uint32_t> rows) {
   Rows written(model, rows);
-  NodeMatrix next;
+  linalg::NodeMatrix next;
   next.start.reserve(model.nodes.size() + 1);
   next.node.reserve(matrix.node.size() + 64 * rows.size());
   next.at.reserve(next.node.capacity());
@@ -186,7 +186,7 @@ void update_node_stiffness(NodeMatrix& matrix, const Model& model,
   matrix = std::move(next);
 }
 
-std::vector<std::uint32_t> changed_rows(const Model& before, const Model& now,
+std::vector<std::uint32_t> changed_rows(const model::Model& before, const model::Model& now,
                                         std::span<const std::uint32_t> place) {
   using Element = std::array<std::uint32_t, 10>;
   const std::size_t count = nodes_of(now);
@@ -194,7 +194,7 @@ std::vector<std::uint32_t> changed_rows(const Model& before, const Model& now,
   bool stay = before.tetrahedra.size() <= now.tetrahedra.size();
   for (std::uint32_t i = 0; i < place.size(); ++i) {
     stay = stay && place[i] == i;
-    if (place[i] == CutModel::gone)
+    if (place[i] == cutting::CutModel::gone)
       continue;
     reached[place[i]] = 1;
     if (!(before.nodes[i].position == now.nodes[place[i]].position))
@@ -218,7 +218,7 @@ std::vector<std::uint32_t> changed_rows(const Model& before, const Model& now,
     Element e{};
     for (std::size_t a = 0; a < count; ++a) {
       const std::uint32_t to = place[node_of(before, t, a)];
-      e[a] = to == CutModel::gone ? none : to;
+      e[a] = to == cutting::CutModel::gone ? none : to;
     }
     return e;
   };
@@ -257,7 +257,7 @@ std::vector<std::uint32_t> changed_rows(const Model& before, const Model& now,
   return rows;
 }
 
-double row_norm(const NodeMatrix& matrix, std::size_t node) {
+double row_norm(const linalg::NodeMatrix& matrix, std::size_t node) {
   constexpr std::array<std::array<std::size_t, 3>, 3> entry{{{0, 1, 2}, {1, 3, 4}, {2, 4, 5}}};
   double norm = 0;
   for (std::size_t a = 0; a < 3; ++a) {
@@ -271,9 +271,9 @@ double row_norm(const NodeMatrix& matrix, std::size_t node) {
         sum += (matrix.fixed[matrix.node[k]] >> b & 1) != 0
                    ? 0
                    : std::abs(matrix.block[matrix.at[k]][3 * a + b]);
-    norm = larger(norm, sum);
+    norm = numeric::larger(norm, sum);
   }
   return norm;
 }
 
-} // namespace gewebe
+} // namespace gewebe::update

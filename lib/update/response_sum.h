@@ -7,7 +7,7 @@
 
 #include <cstddef>
 
-namespace gewebe {
+namespace gewebe::update {
 
 /// Number of rows of a tile. Vectors are packed as [tile][vector][row]; the last tile is filled up
 /// with zeros.
@@ -29,4 +29,4 @@ inline ResponseSum response_sum(CpuLevel level) {
   return level == CpuLevel::baseline ? &response_sum_baseline : &response_sum_avx2;
 }
 
-} // namespace gewebe
+} // namespace gewebe::update

@@ -1,6 +1,6 @@
 #include "update/response_sum_body_internal.h"
 
-namespace gewebe {
+namespace gewebe::update {
 
 void response_sum_baseline(const double* packed, std::size_t count, const double* factor,
                            double* sum, std::size_t stride, std::size_t first_tile,
@@ -8,4 +8,4 @@ void response_sum_baseline(const double* packed, std::size_t count, const double
   add_tiles(packed, count, factor, sum, stride, first_tile, end);
 }
 
-} // namespace gewebe
+} // namespace gewebe::update

@@ -4,7 +4,7 @@
 #include "numeric/four_lanes.h"
 #include "update/response_sum.h"
 
-namespace gewebe {
+namespace gewebe::update {
 namespace {
 
 inline constexpr std::size_t parts = response_tile / 4;
@@ -12,19 +12,20 @@ inline constexpr std::size_t parts = response_tile / 4;
 /// Adds the vectors of a tile. Its twelve sums stay in registers.
 inline void add_tile(const double* tile, std::size_t count, const double* factor,
                      double* const (&sum)[3]) {
-  Four total[3][parts];
+  numeric::Four total[3][parts];
   for (std::size_t a = 0; a < 3; ++a)
     for (std::size_t p = 0; p < parts; ++p)
-      total[a][p] = reinterpret_cast<const Four*>(sum[a])[p];
+      total[a][p] = reinterpret_cast<const numeric::Four*>(sum[a])[p];
   for (std::size_t k = 0; k < count; ++k) {
-    const Four* const from = reinterpret_cast<const Four*>(tile + k * response_tile);
+    const numeric::Four* const from =
+        reinterpret_cast<const numeric::Four*>(tile + k * response_tile);
     for (std::size_t a = 0; a < 3; ++a)
       for (std::size_t p = 0; p < parts; ++p)
         total[a][p] += from[p] * factor[3 * k + a];
   }
   for (std::size_t a = 0; a < 3; ++a)
     for (std::size_t p = 0; p < parts; ++p)
-      reinterpret_cast<Four*>(sum[a])[p] = total[a][p];
+      reinterpret_cast<numeric::Four*>(sum[a])[p] = total[a][p];
 }
 
 inline void add_tiles(const double* packed, std::size_t count, const double* factor, double* sum,
@@ -49,4 +50,4 @@ inline void add_tiles(const double* packed, std::size_t count, const double* fac
 }
 
 } // namespace
-} // namespace gewebe
+} // namespace gewebe::update

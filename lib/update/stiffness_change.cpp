@@ -13,7 +13,7 @@
 // Based on: Hager, Updating the Inverse of a Matrix, 1989 (a matrix changed by a low rank); that
 // copies move with their origins at first, so that shared springs are no change, is our own.
 
-namespace gewebe {
+namespace gewebe::update {
 
 namespace {
 
@@ -23,7 +23,7 @@ constexpr double rounding = std::numeric_limits<double>::epsilon();
   throw Error("the later model is not cut from the earlier one: " + why);
 }
 
-bool is_free(const Node& node, std::size_t axis) {
+bool is_free(const model::Node& node, std::size_t axis) {
   return (node.fixed >> axis & 1) == 0;
 }
 
@@ -32,7 +32,7 @@ struct Pull {
   double along = 0, across = 0;
 };
 
-Pull pull_of(const Spring& s, double length) {
+Pull pull_of(const model::Spring& s, double length) {
   const double across = 1 - s.rest / length;
   // A rest length that was written as the length differs by roundings of its square root.
   return {s.stiffness, std::abs(across) <= 8 * rounding ? 0 : s.stiffness * across};
@@ -51,20 +51,20 @@ struct Changed {
   }
 };
 
-void check_maps(const Model& before, const Model& after, std::span<const std::uint32_t> origin,
-                std::vector<std::uint32_t>& place) {
+void check_maps(const model::Model& before, const model::Model& after,
+                std::span<const std::uint32_t> origin, std::vector<std::uint32_t>& place) {
   if (origin.size() != after.nodes.size() || place.size() != before.nodes.size())
     not_cut("the maps of nodes have " + std::to_string(origin.size()) + " and " +
             std::to_string(place.size()) + " entries, expected " +
             std::to_string(after.nodes.size()) + " and " + std::to_string(before.nodes.size()));
-  std::vector<std::uint32_t> lowest(before.nodes.size(), gone_node);
+  std::vector<std::uint32_t> lowest(before.nodes.size(), cutting::gone_node);
   for (std::uint32_t i = 0; i < origin.size(); ++i) {
     if (origin[i] >= before.nodes.size())
       not_cut("node " + std::to_string(i) + " comes from node " + std::to_string(origin[i]) +
               ", expected one below " + std::to_string(before.nodes.size()));
     lowest[origin[i]] = std::min(lowest[origin[i]], i);
-    const Node& was = before.nodes[origin[i]];
-    const Node& is = after.nodes[i];
+    const model::Node& was = before.nodes[origin[i]];
+    const model::Node& is = after.nodes[i];
     if (!(was.position == is.position))
       not_cut("node " + std::to_string(i) + " is not at the place of node " +
               std::to_string(origin[i]) + ", which it comes from");
@@ -83,15 +83,15 @@ void check_maps(const Model& before, const Model& after, std::span<const std::ui
 
 /// The springs that one of both models has alone, ordered by the old nodes that they join. Both
 /// lists ascend alike where no node was renumbered, so one pass finds them.
-std::vector<Changed> changed_springs(const Model& before, const Model& after,
+std::vector<Changed> changed_springs(const model::Model& before, const model::Model& after,
                                      const StiffnessChange& change) {
   std::vector<Changed> changed;
   const auto earlier = [&](std::size_t e) {
-    const Spring& s = before.springs[e];
+    const model::Spring& s = before.springs[e];
     changed.push_back({s.i, s.j, static_cast<std::uint32_t>(e), false});
   };
   const auto later = [&](std::size_t e) {
-    const Spring& s = after.springs[e];
+    const model::Spring& s = after.springs[e];
     const auto [i, j] = std::minmax(change.origin[s.i], change.origin[s.j]);
     changed.push_back({i, j, static_cast<std::uint32_t>(e), true});
   };
@@ -102,13 +102,13 @@ std::vector<Changed> changed_springs(const Model& before, const Model& after,
       later(b++);
       continue;
     }
-    const Spring& was = before.springs[a];
+    const model::Spring& was = before.springs[a];
     const std::uint32_t i = change.place[was.i], j = change.place[was.j];
-    if (i == gone_node || j == gone_node || b == after.springs.size()) {
+    if (i == cutting::gone_node || j == cutting::gone_node || b == after.springs.size()) {
       earlier(a++);
       continue;
     }
-    const Spring& is = after.springs[b];
+    const model::Spring& is = after.springs[b];
     const Key old_key{static_cast<std::uint32_t>(was.kind), std::min(i, j), std::max(i, j)};
     const Key new_key{static_cast<std::uint32_t>(is.kind), is.i, is.j};
     if (old_key < new_key) {
@@ -167,7 +167,7 @@ std::array<Vec3, 2> across(const Vec3& n) {
 
 class Builder {
 public:
-  Builder(const Model& before, const Model& after, StiffnessChange& change)
+  Builder(const model::Model& before, const model::Model& after, StiffnessChange& change)
       : before_(before), after_(after), change_(change),
         changed_(changed_springs(before, after, change)) {}
 
@@ -189,7 +189,7 @@ public:
 
 private:
   void touch(std::uint32_t node) {
-    if (node != gone_node)
+    if (node != cutting::gone_node)
       change_.touched.push_back(node);
   }
 
@@ -204,7 +204,7 @@ private:
     bool same = end - first == 2 && !changed_[first].later && changed_[first + 1].later;
     for (std::size_t k = first; k < end; ++k) {
       const bool later = changed_[k].later;
-      const Spring& s = (later ? after_ : before_).springs[changed_[k].spring];
+      const model::Spring& s = (later ? after_ : before_).springs[changed_[k].spring];
       const Pull pull = pull_of(s, length);
       const double sign = later ? 1 : -1;
       net.along += sign * pull.along;
@@ -213,7 +213,7 @@ private:
       size.across += std::abs(pull.across);
     }
     if (same) { // renumbered, or of another kind
-      const Spring& is = after_.springs[changed_[first + 1].spring];
+      const model::Spring& is = after_.springs[changed_[first + 1].spring];
       const auto [p, q] = std::minmax(change_.place[i], change_.place[j]);
       same = is.i == p && is.j == q && net.along == 0 && net.across == 0;
     }
@@ -239,9 +239,9 @@ private:
     const auto ends = [&](Row& row, const std::uint32_t p, const std::uint32_t q) {
       for (std::size_t a = 0; a < 3; ++a) {
         const double value = n[static_cast<int>(a)];
-        if (p != gone_node && is_free(before_.nodes[i], a))
+        if (p != cutting::gone_node && is_free(before_.nodes[i], a))
           row.add(3 * std::size_t{p} + a, value);
-        if (q != gone_node && is_free(before_.nodes[j], a))
+        if (q != cutting::gone_node && is_free(before_.nodes[j], a))
           row.add(3 * std::size_t{q} + a, -value);
       }
     };
@@ -283,7 +283,7 @@ private:
     for (const Changed& c : changed_) {
       if (!c.later)
         continue;
-      const Spring& s = after_.springs[c.spring];
+      const model::Spring& s = after_.springs[c.spring];
       if (index[s.i] != SIZE_MAX)
         ends.push_back({s.i, s.j, c.spring});
       if (index[s.j] != SIZE_MAX)
@@ -337,8 +337,8 @@ private:
     }
   }
 
-  const Model& before_;
-  const Model& after_;
+  const model::Model& before_;
+  const model::Model& after_;
   StiffnessChange& change_;
   std::vector<Changed> changed_;
 };
@@ -357,7 +357,7 @@ void SparseRows::add_to(std::size_t r, double factor, std::span<double> x) const
     x[axis[k]] += factor * value[k];
 }
 
-StiffnessChange stiffness_change(const Model& before, const Model& after,
+StiffnessChange stiffness_change(const model::Model& before, const model::Model& after,
                                  std::span<const std::uint32_t> origin,
                                  std::span<const std::uint32_t> place) {
   StiffnessChange change;
@@ -393,4 +393,4 @@ std::vector<double> change_response(const StiffnessChange& change, const AxesSol
   return response;
 }
 
-} // namespace gewebe
+} // namespace gewebe::update

@@ -28,7 +28,7 @@
 #include <span>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::update {
 
 /// Solves for right-hand sides over all axes of a model, one after the other, in place, as
 /// AxisSolver::solve. Forces on fixed axes are ignored, displacements there are 0.
@@ -71,7 +71,7 @@ struct StiffnessChange {
 /// \pre check_model passes for both
 /// \throw Error that names the node if `after` is not cut from `before`: a copy differs from its
 /// origin in position or constraints, or the maps contradict each other
-StiffnessChange stiffness_change(const Model& before, const Model& after,
+StiffnessChange stiffness_change(const model::Model& before, const model::Model& after,
                                  std::span<const std::uint32_t> origin,
                                  std::span<const std::uint32_t> place);
 
@@ -85,4 +85,4 @@ void copy_displacements(const StiffnessChange& change, std::span<const double> x
 std::vector<double> change_response(const StiffnessChange& change, const AxesSolve& solve,
                                     const Context& context);
 
-} // namespace gewebe
+} // namespace gewebe::update

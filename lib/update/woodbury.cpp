@@ -14,7 +14,7 @@
 
 // Based on: Hager, Updating the Inverse of a Matrix, 1989.
 
-namespace gewebe {
+namespace gewebe::update {
 
 namespace {
 
@@ -93,7 +93,7 @@ struct WoodburySolver::State {
 
 WoodburySolver::WoodburySolver(StiffnessChange change, AxesSolve solve, const Context& context)
     : state_(std::make_unique<State>()) {
-  if (std::find(change.place.begin(), change.place.end(), gone_node) != change.place.end())
+  if (std::find(change.place.begin(), change.place.end(), cutting::gone_node) != change.place.end())
     throw Error("nodes have left the model, expected a factor of what is left");
   state_->change = std::move(change);
   state_->solve = std::move(solve);
@@ -143,8 +143,8 @@ void WoodburySolver::solve(std::span<double> over_axes, std::size_t columns) con
     for (std::size_t r = 0; r < rank; ++r)
       response[r] = state_->answer(r).data();
     for (std::size_t c = 0; c < columns; ++c)
-      column_sum<double>(state_->context.cpu)(response.data(), right.col(index(c)).data(), rank,
-                                              moved.data() + c * axes, 0, axes);
+      columns::column_sum<double>(state_->context.cpu)(response.data(), right.col(index(c)).data(),
+                                                       rank, moved.data() + c * axes, 0, axes);
     right = -right;
   }
   for (std::size_t c = 0; c < columns; ++c) {
@@ -155,4 +155,4 @@ void WoodburySolver::solve(std::span<double> over_axes, std::size_t columns) con
   }
 }
 
-} // namespace gewebe
+} // namespace gewebe::update

@@ -8,7 +8,7 @@
 #include <memory>
 #include <span>
 
-namespace gewebe {
+namespace gewebe::update {
 
 /// u' = C' f' from a solver of the earlier K, by the capacitance matrix of the change (Sherman and
 /// Morrison 1950; Woodbury 1950; Hager 1989, in the symmetric form of a bordered system).
@@ -47,4 +47,4 @@ private:
   std::unique_ptr<State> state_;
 };
 
-} // namespace gewebe
+} // namespace gewebe::update

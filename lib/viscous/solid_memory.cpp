@@ -10,7 +10,7 @@
 #include <cmath>
 #include <utility>
 
-namespace gewebe {
+namespace gewebe::viscous {
 
 namespace {
 
@@ -23,14 +23,14 @@ constexpr std::size_t most_points = 24;
 double mean_of_decay(double x) {
   if (x < 0.01)
     return 1 - x / 2 * (1 - x / 3 * (1 - x / 4 * (1 - x / 5 * (1 - x / 6))));
-  return (1 - exponential(-x)) / x;
+  return (1 - numeric::exponential(-x)) / x;
 }
 
-double product(const SymmetricTensor& a, const SymmetricTensor& b) {
+double product(const fem::SymmetricTensor& a, const fem::SymmetricTensor& b) {
   return a[0] * b[0] + a[1] * b[1] + a[2] * b[2] + 2 * (a[3] * b[3] + a[4] * b[4] + a[5] * b[5]);
 }
 
-double largest(const SymmetricTensor& a) {
+double largest(const fem::SymmetricTensor& a) {
   double most = 0;
   for (const double value : a)
     most = std::max(most, std::abs(value));
@@ -44,12 +44,13 @@ struct Sums {
 
 } // namespace
 
-SolidMemory::SolidMemory(const TetMesh& mesh, std::span<const SolidMaterial> materials,
-                         std::span<SolidElement> elements)
+SolidMemory::SolidMemory(const tetrahedra::TetMesh& mesh,
+                         std::span<const fem::SolidMaterial> materials,
+                         std::span<fem::SolidElement> elements)
     : mesh_(mesh), elements_(elements), points_(mesh.middles.empty() ? 1 : most_points) {
-  for (const SolidMaterial& m : materials) {
+  for (const fem::SolidMaterial& m : materials) {
     Law& law = laws_.emplace_back();
-    for (const PronyTerm& term : m.prony) {
+    for (const model::PronyTerm& term : m.prony) {
       law.terms.push_back({.share = term.share, .time = term.time});
       law.rest -= term.share;
     }
@@ -70,7 +71,7 @@ void SolidMemory::restore(const MemoryState& state) {
     return;
   state_ = state;
   if (!state_.tensors)
-    state_.tensors = std::make_shared<const std::vector<SymmetricTensor>>(count_);
+    state_.tensors = std::make_shared<const std::vector<fem::SymmetricTensor>>(count_);
   begin(0);
 }
 
@@ -78,7 +79,7 @@ void SolidMemory::begin(double h) {
   for (Law& law : laws_) {
     law.share = 1;
     for (Term& term : law.terms) {
-      term.kept = exponential(-h / term.time);
+      term.kept = numeric::exponential(-h / term.time);
       term.mean = mean_of_decay(h / term.time);
       law.share -= term.share * (1 - term.mean);
     }
@@ -90,9 +91,9 @@ void SolidMemory::begin(double h) {
 void SolidMemory::recall() {
   for (const Part& part : parts_) {
     const Law& law = laws_[part.law];
-    const SymmetricTensor* from = state_.tensors->data() + part.first;
+    const fem::SymmetricTensor* from = state_.tensors->data() + part.first;
     for (std::size_t n = 0; n < points_; ++n, from += 1 + law.terms.size()) {
-      SymmetricTensor& a = acting_[part.acting + n];
+      fem::SymmetricTensor& a = acting_[part.acting + n];
       a.fill(0);
       for (std::size_t k = 0; k < law.terms.size(); ++k)
         for (std::size_t c = 0; c < a.size(); ++c)
@@ -105,32 +106,32 @@ void SolidMemory::recall() {
 
 void SolidMemory::end(std::span<const double> u, std::span<const Vec3> bubbles,
                       const Context& context) {
-  auto next = std::make_shared<std::vector<SymmetricTensor>>(*state_.tensors);
+  auto next = std::make_shared<std::vector<fem::SymmetricTensor>>(*state_.tensors);
   std::vector<Sums> sums(parts_.size());
   const auto end_one = [&](const Part& part, Sums& sum) {
-    const SolidElement& element = elements_[part.element];
+    const fem::SolidElement& element = elements_[part.element];
     std::array<Vec3, 10> of_nodes;
-    const std::size_t count = solid_nodes(mesh_);
+    const std::size_t count = fem::solid_nodes(mesh_);
     for (std::size_t a = 0; a < count; ++a) {
-      const std::size_t axis = 3 * std::size_t{solid_node(mesh_, part.element, a)};
+      const std::size_t axis = 3 * std::size_t{fem::solid_node(mesh_, part.element, a)};
       of_nodes[a] = {u[axis], u[axis + 1], u[axis + 2]};
     }
-    std::array<HyperelasticPointState, most_points> points;
-    point_states(element, std::span(of_nodes).first(count),
-                 bubbles.empty() ? Vec3{} : bubbles[part.element], points);
+    std::array<fem::HyperelasticPointState, most_points> points;
+    fem::point_states(element, std::span(of_nodes).first(count),
+                      bubbles.empty() ? Vec3{} : bubbles[part.element], points);
     const Law& law = laws_[part.law];
-    SymmetricTensor* at = next->data() + part.first;
+    fem::SymmetricTensor* at = next->data() + part.first;
     for (std::size_t n = 0; n < points_; ++n, at += 1 + law.terms.size()) {
-      const HyperelasticPointState& q = points[n];
-      const SymmetricTensor before = at[0];
+      const fem::HyperelasticPointState& q = points[n];
+      const fem::SymmetricTensor before = at[0];
       if (q.is_sound)
         at[0] = q.stress;
-      SymmetricTensor sudden{}; // A of a sudden step from here
+      fem::SymmetricTensor sudden{}; // A of a sudden step from here
       double stored = 0;
       for (std::size_t k = 0; k < law.terms.size(); ++k) {
         const Term& term = law.terms[k];
-        SymmetricTensor& h = at[1 + k];
-        SymmetricTensor change;
+        fem::SymmetricTensor& h = at[1 + k];
+        fem::SymmetricTensor change;
         for (std::size_t c = 0; c < h.size(); ++c) {
           const double now = term.kept * h[c] + term.share * term.mean * (at[0][c] - before[c]);
           change[c] = now - h[c];
@@ -141,7 +142,7 @@ void SolidMemory::end(std::span<const double> u, std::span<const Vec3> bubbles,
         stored += product(h, h) / (4 * term.share * element.material.mu);
       }
       sum.stress = std::max(sum.stress, largest(at[0]));
-      const auto beyond = [&](double share, const SymmetricTensor& a) {
+      const auto beyond = [&](double share, const fem::SymmetricTensor& a) {
         return q.weight * (stored - (share - law.rest) * q.energy - product(a, q.strain) / 2);
       };
       sum.beyond += beyond(law.share, acting_[part.acting + n]);
@@ -165,4 +166,4 @@ void SolidMemory::end(std::span<const double> u, std::span<const Vec3> bubbles,
   begin(0);
 }
 
-} // namespace gewebe
+} // namespace gewebe::viscous

@@ -37,12 +37,12 @@
 #include <span>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::viscous {
 
 /// State of all elements.
 struct MemoryState {
   /// By element and point: S_d, then H of each term, Pa.
-  std::shared_ptr<const std::vector<SymmetricTensor>> tensors;
+  std::shared_ptr<const std::vector<fem::SymmetricTensor>> tensors;
   double beyond = 0; ///< see SolidMemory::beyond, of a sudden step
   bool still = true; ///< the last step changed H by less than 1e-9 of the largest S_d
 };
@@ -51,8 +51,8 @@ class SolidMemory {
 public:
   /// At rest; lets elements refer to what is here. \pre elements are those of the mesh and the
   /// materials, stay where they are and outlive this; the mesh, too
-  SolidMemory(const TetMesh& mesh, std::span<const SolidMaterial> materials,
-              std::span<SolidElement> elements);
+  SolidMemory(const tetrahedra::TetMesh& mesh, std::span<const fem::SolidMaterial> materials,
+              std::span<fem::SolidElement> elements);
 
   /// Whether no element remembers anything; nothing below is needed then.
   bool empty() const noexcept { return parts_.empty(); }
@@ -86,15 +86,15 @@ private:
   };
   void recall();
 
-  const TetMesh& mesh_;
-  std::span<SolidElement> elements_;
+  const tetrahedra::TetMesh& mesh_;
+  std::span<fem::SolidElement> elements_;
   std::size_t points_; ///< of an element
   std::vector<Law> laws_;
   std::vector<Part> parts_;
-  std::size_t count_ = 0;               ///< of tensors
-  std::vector<SymmetricTensor> acting_; ///< A
+  std::size_t count_ = 0;                    ///< of tensors
+  std::vector<fem::SymmetricTensor> acting_; ///< A
   MemoryState state_;
   double beyond_ = 0;
 };
 
-} // namespace gewebe
+} // namespace gewebe::viscous

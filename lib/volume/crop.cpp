@@ -9,7 +9,7 @@
 #include <cstddef>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::volume {
 namespace {
 
 constexpr std::array<Int3, 6> steps{
@@ -177,4 +177,4 @@ Grid crop(const Context& context, const Grid& grid, const Box3& box, double isov
   return builder.finish();
 }
 
-} // namespace gewebe
+} // namespace gewebe::volume

@@ -4,7 +4,7 @@
 #include "base/context.h"
 #include "volume/grid.h"
 
-namespace gewebe {
+namespace gewebe::volume {
 
 /// Cuts a box out of what is inside: voxels with their centre in `box` keep their value, all others
 /// become outside. A voxel next to the box, beside one that is inside, gets the value with which
@@ -17,4 +17,4 @@ namespace gewebe {
 /// isovalue (there is no part to cut out); if context.max_memory would not do
 Grid crop(const Context& context, const Grid& grid, const Box3& box, double isovalue);
 
-} // namespace gewebe
+} // namespace gewebe::volume

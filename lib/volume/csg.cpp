@@ -15,7 +15,7 @@
 #include <limits>
 #include <optional>
 
-namespace gewebe {
+namespace gewebe::volume {
 namespace {
 
 std::string number(double value) {
@@ -370,4 +370,4 @@ Grid csg(const Context& context, CsgOperation operation, std::vector<CsgOperand>
   return result;
 }
 
-} // namespace gewebe
+} // namespace gewebe::volume

@@ -9,7 +9,7 @@
 #include <string_view>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::volume {
 
 /// With A the result so far and B the next operand. The set operations clamp each operand to [0,
 /// 1]; add and subtract clamp nothing but the end result, which is at least 0.
@@ -66,4 +66,4 @@ struct CsgReport {
 Grid csg(const Context& context, CsgOperation operation, std::vector<CsgOperand> operands,
          const CsgOptions& options = {}, CsgReport* report = nullptr);
 
-} // namespace gewebe
+} // namespace gewebe::volume

@@ -3,7 +3,7 @@
 #include <cmath>
 #include <cstddef>
 
-namespace gewebe {
+namespace gewebe::volume {
 namespace {
 
 /// The voxel at or below a place, and how far beyond it the place lies.
@@ -68,4 +68,4 @@ Vec3 Field::gradient(const Vec3& index) {
   return inverse_[0] * sum.x + inverse_[1] * sum.y + inverse_[2] * sum.z;
 }
 
-} // namespace gewebe
+} // namespace gewebe::volume

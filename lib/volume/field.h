@@ -5,7 +5,7 @@
 
 #include <array>
 
-namespace gewebe {
+namespace gewebe::volume {
 
 /// Trilinear interpolation of a grid; for one thread, fast for neighbouring places.
 class Field {
@@ -24,4 +24,4 @@ private:
   std::array<Vec3, 3> inverse_; // rows of the inverse of the transform's linear part
 };
 
-} // namespace gewebe
+} // namespace gewebe::volume

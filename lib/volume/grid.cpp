@@ -13,7 +13,7 @@
 #include <cstring>
 #include <utility>
 
-namespace gewebe {
+namespace gewebe::volume {
 namespace {
 
 using openvdb::Coord;
@@ -398,4 +398,4 @@ Grid GridBuilder::finish(bool prune) {
   return make_grid(state_->info, state_->tree, state_->storage);
 }
 
-} // namespace gewebe
+} // namespace gewebe::volume

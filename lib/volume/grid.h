@@ -20,7 +20,7 @@
 #include <string>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::volume {
 
 inline constexpr int leaf_dim = 8;
 inline constexpr int leaf_voxels = 512;
@@ -190,4 +190,4 @@ private:
   std::unique_ptr<State> state_;
 };
 
-} // namespace gewebe
+} // namespace gewebe::volume

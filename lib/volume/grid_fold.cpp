@@ -12,7 +12,7 @@
 #include <set>
 #include <utility>
 
-namespace gewebe {
+namespace gewebe::volume {
 namespace {
 
 using openvdb::Coord;
@@ -381,4 +381,4 @@ Grid fold_grids(const Context& context, const GridInfo& info, std::vector<Grid> 
   return make_grid(info, target.tree(), storage);
 }
 
-} // namespace gewebe
+} // namespace gewebe::volume

@@ -7,7 +7,7 @@
 #include <array>
 #include <functional>
 
-namespace gewebe {
+namespace gewebe::volume {
 
 /// One of the grids in a cubic block of 8, 128 or 4096 voxels' edge.
 struct BlockSource {
@@ -54,4 +54,4 @@ struct FoldReport {
 Grid fold_grids(const Context& context, const GridInfo& info, std::vector<Grid> grids,
                 const BlockRule& block_rule, const LeafRule& leaf_rule, FoldReport& report);
 
-} // namespace gewebe
+} // namespace gewebe::volume

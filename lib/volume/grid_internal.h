@@ -13,7 +13,7 @@
 #include <utility>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::volume {
 
 using FloatTree = openvdb::FloatTree;
 
@@ -66,4 +66,4 @@ inline openvdb::Coord to_coord(const Int3& i) {
 std::uint64_t* mask_words(FloatLeaf& leaf);
 LeafView view_of(const FloatLeaf& leaf);
 
-} // namespace gewebe
+} // namespace gewebe::volume

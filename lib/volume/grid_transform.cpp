@@ -4,7 +4,7 @@
 #include <cmath>
 #include <cstdio>
 
-namespace gewebe {
+namespace gewebe::volume {
 namespace {
 
 Vec3 column(const GridTransform& transform, std::size_t axis) {
@@ -86,4 +86,4 @@ bool same_lattice(const GridTransform& a, const GridTransform& b, const Int3& mi
   return true;
 }
 
-} // namespace gewebe
+} // namespace gewebe::volume

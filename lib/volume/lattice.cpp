@@ -7,7 +7,7 @@
 #include <cmath>
 #include <string>
 
-namespace gewebe {
+namespace gewebe::volume {
 namespace {
 
 constexpr double index_limit = 1 << 30;
@@ -22,7 +22,7 @@ GridTransform lattice_for_dim(const Box3& box, std::int64_t dim) {
   const double side = box.longest_side();
   const double voxel = side / static_cast<double>(dim);
   if (!(side > 0 && std::isfinite(side)) || !(voxel > 0))
-    throw Error("the box has no extent (" + six_digits(side) +
+    throw Error("the box has no extent (" + text::six_digits(side) +
                 " mm), so --dim has nothing to divide");
   return uniform_transform(voxel);
 }
@@ -40,7 +40,7 @@ bool index_range(const GridTransform& transform, const Box3& box, Int3& min, Int
     const double low = std::ceil(index_box.min[a]), high = std::floor(index_box.max[a]);
     if (!(std::fabs(low) < index_limit && std::fabs(high) < index_limit))
       throw Error("the lattice would need the voxel index " +
-                  six_digits(std::fabs(low) < index_limit ? high : low) +
+                  text::six_digits(std::fabs(low) < index_limit ? high : low) +
                   ", expected at most 2^30 in magnitude: choose a larger voxel");
     const auto n = static_cast<std::size_t>(a);
     min[n] = static_cast<std::int32_t>(low);
@@ -50,4 +50,4 @@ bool index_range(const GridTransform& transform, const Box3& box, Int3& min, Int
   return some;
 }
 
-} // namespace gewebe
+} // namespace gewebe::volume

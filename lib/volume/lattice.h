@@ -3,7 +3,7 @@
 
 #include "volume/grid.h"
 
-namespace gewebe {
+namespace gewebe::volume {
 
 /// Transform of --dim N: voxel edge = longest side of `box` / N, centres at integer multiples of
 /// it. \throw Error if the box is empty or has no extent
@@ -14,4 +14,4 @@ GridTransform lattice_for_dim(const Box3& box, std::int64_t dim);
 /// ±2^30
 bool index_range(const GridTransform& transform, const Box3& box, Int3& min, Int3& max);
 
-} // namespace gewebe
+} // namespace gewebe::volume

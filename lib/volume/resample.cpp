@@ -11,7 +11,7 @@
 
 // Based on: Turkowski, Filters for Common Resampling Tasks, 1990 (the tent as a prefilter).
 
-namespace gewebe {
+namespace gewebe::volume {
 namespace {
 
 /// Box of index space with real corners, closed.
@@ -520,4 +520,4 @@ Grid resample(const Context& context, const Grid& grid, const GridTransform& tar
   return builder.finish();
 }
 
-} // namespace gewebe
+} // namespace gewebe::volume

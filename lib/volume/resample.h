@@ -4,7 +4,7 @@
 #include "base/context.h"
 #include "volume/grid.h"
 
-namespace gewebe {
+namespace gewebe::volume {
 
 /// Samples `grid` on the lattice of `target`: at each new centre the mean of the old values,
 /// weighted with a tent about that centre, separable along the old axes, of half-width max(S, s),
@@ -21,4 +21,4 @@ namespace gewebe {
 /// singular; if S > 64 s; if an index would leave ±2^30; if context.max_memory would not do
 Grid resample(const Context& context, const Grid& grid, const GridTransform& target);
 
-} // namespace gewebe
+} // namespace gewebe::volume

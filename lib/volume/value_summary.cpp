@@ -7,7 +7,7 @@
 #include <cmath>
 #include <limits>
 
-namespace gewebe {
+namespace gewebe::volume {
 namespace {
 
 // Floats as integers in the same order (-0 just below +0), so that smallest and largest are found
@@ -93,4 +93,4 @@ ValueSummary summarize_values(const Context& context, std::span<const LeafView> 
   return summary;
 }
 
-} // namespace gewebe
+} // namespace gewebe::volume

@@ -3,9 +3,9 @@
 
 #include "volume/grid.h"
 
-namespace gewebe {
+namespace gewebe::volume {
 
 ValueSummary summarize_values(const Context& context, std::span<const LeafView> leaves,
                               std::span<const TileView> tiles, const GridInfo& info);
 
-} // namespace gewebe
+} // namespace gewebe::volume

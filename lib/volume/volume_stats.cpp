@@ -4,7 +4,7 @@
 
 #include <cmath>
 
-namespace gewebe {
+namespace gewebe::volume {
 namespace {
 
 struct Sums {
@@ -97,4 +97,4 @@ VolumeStats volume_stats(const Context& context, const Grid& grid) {
   return stats;
 }
 
-} // namespace gewebe
+} // namespace gewebe::volume

@@ -5,7 +5,7 @@
 
 #include <cstdint>
 
-namespace gewebe {
+namespace gewebe::volume {
 
 struct VolumeStats {
   std::uint64_t active_voxels = 0;
@@ -22,4 +22,4 @@ struct VolumeStats {
 /// Counts in a fixed order, so the sums do not depend on the thread count.
 VolumeStats volume_stats(const Context& context, const Grid& grid);
 
-} // namespace gewebe
+} // namespace gewebe::volume

@@ -6,7 +6,7 @@
 #include "base/parallel.h"
 #include "voxelization/inside_scan_internal.h"
 
-namespace gewebe {
+namespace gewebe::voxelization {
 namespace {
 
 /// The pair of depth buffers of one axis w: for each ray (u, v) the first samples beyond its first
@@ -31,12 +31,13 @@ struct DepthTiles {
   std::vector<Tile> tiles;
 
   explicit DepthTiles(const DepthPair& pair)
-      : columns((pair.v.end - pair.v.begin) / leaf_dim),
-        tiles(pair.near.size() / (std::size_t{leaf_dim} * leaf_dim)) {
+      : columns((pair.v.end - pair.v.begin) / volume::leaf_dim),
+        tiles(pair.near.size() / (std::size_t{volume::leaf_dim} * volume::leaf_dim)) {
     for (std::int32_t u = pair.u.begin; u < pair.u.end; ++u)
       for (std::int32_t v = pair.v.begin; v < pair.v.end; ++v) {
-        Tile& tile = tiles[static_cast<std::size_t>((u - pair.u.begin) / leaf_dim * columns +
-                                                    (v - pair.v.begin) / leaf_dim)];
+        Tile& tile =
+            tiles[static_cast<std::size_t>((u - pair.u.begin) / volume::leaf_dim * columns +
+                                           (v - pair.v.begin) / volume::leaf_dim)];
         const std::int32_t near = pair.near[pair.at(u, v)], far = pair.far[pair.at(u, v)];
         tile = {std::max(tile.near_all, near), std::min(tile.far_all, far),
                 std::min(tile.near_any, near), std::max(tile.far_any, far)};
@@ -82,7 +83,7 @@ DepthPair draw(const Context& context, const SampleMesh& mesh, const View& view,
   parallel_blocks(context, chunks.count(), 1, [&](std::size_t begin, std::size_t end) {
     for (std::size_t n = begin; n < end; ++n) {
       const std::int32_t chunk = chunks.range.begin + static_cast<std::int32_t>(n);
-      const std::int32_t rows = chunks.slabs_each * leaf_dim;
+      const std::int32_t rows = chunks.slabs_each * volume::leaf_dim;
       for_each_crossing(seen, chunks, chunk, {chunk * rows, (chunk + 1) * rows}, view.ties,
                         exact_tests[n], [&](std::int32_t a, std::int32_t b, std::int32_t depth) {
                           const std::size_t ray = pair.at(a, b);
@@ -101,19 +102,19 @@ DepthPair draw(const Context& context, const SampleMesh& mesh, const View& view,
 
 /// Which of the samples from leaf_begin on lie in [near, far), the first in the lowest bit.
 unsigned bits_between(std::int32_t near, std::int32_t far, std::int32_t leaf_begin) {
-  const std::int32_t low = std::clamp(near, leaf_begin, leaf_begin + leaf_dim) - leaf_begin;
-  const std::int32_t high = std::clamp(far, leaf_begin, leaf_begin + leaf_dim) - leaf_begin;
-  return low < high ? (0xffu << low) & (0xffu >> (leaf_dim - high)) : 0u;
+  const std::int32_t low = std::clamp(near, leaf_begin, leaf_begin + volume::leaf_dim) - leaf_begin;
+  const std::int32_t high = std::clamp(far, leaf_begin, leaf_begin + volume::leaf_dim) - leaf_begin;
+  return low < high ? (0xffu << low) & (0xffu >> (volume::leaf_dim - high)) : 0u;
 }
 
 /// The leaf from (i, j, k) on.
 BitLeaf leaf_between(const std::array<DepthPair, 3>& pairs, const Int3& origin) {
   BitLeaf leaf;
-  for (std::int32_t a = 0; a < leaf_dim; ++a)
-    for (std::int32_t b = 0; b < leaf_dim; ++b) {
+  for (std::int32_t a = 0; a < volume::leaf_dim; ++a)
+    for (std::int32_t b = 0; b < volume::leaf_dim; ++b) {
       const std::size_t ray = pairs[2].at(origin[0] + a, origin[1] + b);
       unsigned column = bits_between(pairs[2].near[ray], pairs[2].far[ray], origin[2]);
-      for (std::int32_t c = 0; c < leaf_dim; ++c) {
+      for (std::int32_t c = 0; c < volume::leaf_dim; ++c) {
         const std::size_t along_i = pairs[0].at(origin[1] + b, origin[2] + c);
         const std::size_t along_j = pairs[1].at(origin[0] + a, origin[2] + c);
         const std::int32_t i = origin[0] + a, j = origin[1] + b;
@@ -144,36 +145,38 @@ InsideScan depth_buffer_scan(const Context& context, const SampleMesh& mesh,
 
   const Range i = pairs[2].u, j = pairs[2].v, k = pairs[0].v;
   MemoryAccount memory(context, "the voxelized mesh");
-  std::vector<Slab<BitLeaf>> slabs(static_cast<std::size_t>((i.end - i.begin) / leaf_dim));
+  std::vector<Slab<BitLeaf>> slabs(static_cast<std::size_t>((i.end - i.begin) / volume::leaf_dim));
   parallel_blocks(context, slabs.size(), 1, [&](std::size_t begin, std::size_t end) {
     for (std::size_t s = begin; s < end; ++s) {
       Slab<BitLeaf>& slab = slabs[s];
       slab.memory = MemoryShare(memory);
-      const std::int32_t row = i.begin + static_cast<std::int32_t>(s) * leaf_dim;
+      const std::int32_t row = i.begin + static_cast<std::int32_t>(s) * volume::leaf_dim;
       const auto tile_at = [&](std::size_t axis, std::int32_t u, std::int32_t v) {
         const DepthPair& pair = pairs[axis];
-        return tiles[axis].tiles[static_cast<std::size_t>(
-            (u - pair.u.begin) / leaf_dim * tiles[axis].columns + (v - pair.v.begin) / leaf_dim)];
+        return tiles[axis].tiles[static_cast<std::size_t>((u - pair.u.begin) / volume::leaf_dim *
+                                                              tiles[axis].columns +
+                                                          (v - pair.v.begin) / volume::leaf_dim)];
       };
-      for (std::int32_t b = j.begin; b < j.end; b += leaf_dim) {
+      for (std::int32_t b = j.begin; b < j.end; b += volume::leaf_dim) {
         const DepthTiles::Tile along_k = tile_at(2, row, b);
         if (along_k.near_any >= along_k.far_any)
           continue;
         const std::int32_t last = std::min(k.end, along_k.far_any);
-        for (std::int32_t c = std::max(k.begin, along_k.near_any & ~7); c < last; c += leaf_dim) {
+        for (std::int32_t c = std::max(k.begin, along_k.near_any & ~7); c < last;
+             c += volume::leaf_dim) {
           const std::array<DepthTiles::Tile, 3> three{tile_at(0, b, c), tile_at(1, row, c),
                                                       along_k};
           const Int3 origin{row, b, c};
           bool full = true, empty = false;
           for (std::size_t axis = 0; axis < 3; ++axis) {
             full = full && three[axis].near_all <= origin[axis] &&
-                   origin[axis] + leaf_dim <= three[axis].far_all;
-            empty = empty || three[axis].near_any >= origin[axis] + leaf_dim ||
+                   origin[axis] + volume::leaf_dim <= three[axis].far_all;
+            empty = empty || three[axis].near_any >= origin[axis] + volume::leaf_dim ||
                     three[axis].far_any <= origin[axis];
           }
           if (empty)
             continue;
-          const LeafKey key{b / leaf_dim, c / leaf_dim};
+          const LeafKey key{b / volume::leaf_dim, c / volume::leaf_dim};
           const BitLeaf leaf = full ? BitLeaf{} : leaf_between(pairs, origin);
           if (full || leaf.is_constant(BitLeaf::full(1))) {
             if (!slab.runs.empty() && slab.runs.back().j == key.j &&
@@ -189,7 +192,7 @@ InsideScan depth_buffer_scan(const Context& context, const SampleMesh& mesh,
       }
     }
   });
-  return join_slabs(slabs, i.begin / leaf_dim);
+  return join_slabs(slabs, i.begin / volume::leaf_dim);
 }
 
-} // namespace gewebe
+} // namespace gewebe::voxelization

@@ -8,7 +8,7 @@
 #include "voxelization/triangle_chunks_internal.h"
 #include "voxelization/voxelize.h"
 
-namespace gewebe {
+namespace gewebe::voxelization {
 
 /// Scans a mesh by this rule. Ties are decided as by the parity rule. Memory beside the result: two
 /// int32 for each ray along each axis of the mesh's box. Adds to triangles_skipped, crossings and
@@ -17,4 +17,4 @@ namespace gewebe {
 InsideScan depth_buffer_scan(const Context& context, const SampleMesh& mesh,
                              VoxelizeReport& report);
 
-} // namespace gewebe
+} // namespace gewebe::voxelization

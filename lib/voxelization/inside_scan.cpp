@@ -4,7 +4,7 @@
 
 #include <type_traits>
 
-namespace gewebe {
+namespace gewebe::voxelization {
 namespace {
 
 template <class Leaf, class Take>
@@ -22,9 +22,9 @@ void join(std::vector<Slab<Leaf>>& slabs, std::int32_t first_slab, InsideScan& s
   else
     scan.counts.reserve(leaves);
   for (std::size_t s = 0; s < slabs.size(); ++s) {
-    const std::int32_t i = (first_slab + static_cast<std::int32_t>(s)) * leaf_dim;
+    const std::int32_t i = (first_slab + static_cast<std::int32_t>(s)) * volume::leaf_dim;
     for (const LeafKey& key : slabs[s].keys)
-      scan.origins.push_back({i, key.j * leaf_dim, key.k * leaf_dim});
+      scan.origins.push_back({i, key.j * volume::leaf_dim, key.k * volume::leaf_dim});
     for (const Leaf& leaf : slabs[s].leaves)
       take(leaf);
     slabs[s] = {};
@@ -37,7 +37,7 @@ std::int32_t voxel_of(std::int32_t f, std::int32_t n) {
 }
 
 /// Adds the samples of a cube, cut to [begin, end) along i.
-void add_cube(const TileView& cube, std::int32_t n, std::int32_t begin, std::int32_t end,
+void add_cube(const volume::TileView& cube, std::int32_t n, std::int32_t begin, std::int32_t end,
               LeafMap<CountLeaf>& map) {
   const Int3 low{std::max(cube.origin[0], begin), cube.origin[1], cube.origin[2]};
   const Int3 high{std::min(cube.origin[0] + cube.dim, end), cube.origin[1] + cube.dim,
@@ -51,7 +51,7 @@ void add_cube(const TileView& cube, std::int32_t n, std::int32_t begin, std::int
   for (std::int32_t i = voxel_of(low[0], n); i * n < high[0]; ++i)
     for (std::int32_t j = voxel_of(low[1], n); j * n < high[1]; ++j)
       for (std::int32_t k = voxel_of(low[2], n); k * n < high[2]; ++k)
-        map.at({j >> 3, k >> 3}).count[static_cast<std::size_t>(leaf_offset({i, j, k}))] +=
+        map.at({j >> 3, k >> 3}).count[static_cast<std::size_t>(volume::leaf_offset({i, j, k}))] +=
             overlap(i, 0) * overlap(j, 1) * overlap(k, 2);
 }
 
@@ -65,25 +65,26 @@ void add_leaf(const Int3& origin, const std::array<std::uint64_t, 8>& bits, std:
       continue;
     const std::int32_t i = voxel_of(origin[0] + column / 8, n),
                        j = voxel_of(origin[1] + column % 8, n);
-    for (std::int32_t c = 0; c < leaf_dim; ++c)
+    for (std::int32_t c = 0; c < volume::leaf_dim; ++c)
       if ((states >> c & 1) != 0) {
         const std::int32_t k = voxel_of(origin[2] + c, n);
-        ++map.at({j >> 3, k >> 3}).count[static_cast<std::size_t>(leaf_offset({i, j, k}))];
+        ++map.at({j >> 3, k >> 3}).count[static_cast<std::size_t>(volume::leaf_offset({i, j, k}))];
       }
   }
 }
 
 } // namespace
 
-std::vector<TileView> tiles_of_runs(const std::vector<std::span<const FullRun>>& runs,
-                                    std::int32_t first_slab) {
-  const auto for_each_node = [](std::int32_t i, const FullRun& run, auto&& visit) {
+std::vector<volume::TileView> tiles_of_runs(const std::vector<std::span<const FullRun>>& runs,
+                                            std::int32_t first_slab) {
+  const auto for_each_node = [](std::int32_t i, const gewebe::voxelization::FullRun& run,
+                                auto&& visit) {
     for (std::int32_t k = (run.k_begin + 15) >> 4; k < run.k_end >> 4; ++k)
-      visit(Int3{i >> 4, run.j >> 4, k});
+      visit(gewebe::Int3{i >> 4, run.j >> 4, k});
   };
   const auto for_each_run = [&](auto&& visit) {
     for (std::size_t s = 0; s < runs.size(); ++s)
-      for (const FullRun& run : runs[s])
+      for (const gewebe::voxelization::FullRun& run : runs[s])
         visit(first_slab + static_cast<std::int32_t>(s), run);
   };
   std::vector<Int3> covered;
@@ -101,7 +102,7 @@ std::vector<TileView> tiles_of_runs(const std::vector<std::span<const FullRun>>&
     return std::binary_search(full.begin(), full.end(), node);
   };
 
-  std::vector<TileView> tiles;
+  std::vector<volume::TileView> tiles;
   for (const Int3& node : full)
     tiles.push_back({{node[0] * 128, node[1] * 128, node[2] * 128}, 128, 1.0f, true});
   for_each_run([&](std::int32_t i, const FullRun& run) {
@@ -131,15 +132,15 @@ InsideScan join_slabs(std::vector<Slab<CountLeaf>>& slabs, std::int32_t first_sl
 }
 
 InsideScan count_samples(const Context& context, const InsideScan& fine, int samples) {
-  const std::int32_t rows = leaf_dim * samples; // of samples in a slab
+  const std::int32_t rows = volume::leaf_dim * samples; // of samples in a slab
   std::int32_t low = INT32_MAX, high = INT32_MIN;
   const auto include = [&](std::int32_t i, std::int32_t dim) {
     low = std::min(low, voxel_of(i, rows));
     high = std::max(high, voxel_of(i + dim - 1, rows) + 1);
   };
   for (const Int3& origin : fine.origins)
-    include(origin[0], leaf_dim);
-  for (const TileView& tile : fine.tiles)
+    include(origin[0], volume::leaf_dim);
+  for (const volume::TileView& tile : fine.tiles)
     include(tile.origin[0], tile.dim);
   if (low >= high)
     return {samples, {}, {}, {}, {}, {}};
@@ -149,7 +150,7 @@ InsideScan count_samples(const Context& context, const InsideScan& fine, int sam
     for (std::size_t s = first; s < last; ++s) {
       const std::int32_t begin = (low + static_cast<std::int32_t>(s)) * rows, end = begin + rows;
       LeafMap<CountLeaf> map(memory);
-      for (const TileView& tile : fine.tiles)
+      for (const volume::TileView& tile : fine.tiles)
         add_cube(tile, samples, begin, end, map);
       for (std::size_t leaf = 0; leaf < fine.origins.size(); ++leaf)
         if (fine.origins[leaf][0] >= begin && fine.origins[leaf][0] < end)
@@ -177,4 +178,4 @@ InsideScan count_samples(const Context& context, const InsideScan& fine, int sam
   return join_slabs(slabs, low, samples);
 }
 
-} // namespace gewebe
+} // namespace gewebe::voxelization

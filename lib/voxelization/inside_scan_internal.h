@@ -9,7 +9,7 @@
 #include <bit>
 #include <span>
 
-namespace gewebe {
+namespace gewebe::voxelization {
 
 // A leaf first holds flips: where along k the state of a column changes. `integrate` sums them up
 // along k, starting from what the column carries over from the leaf before.
@@ -42,7 +42,7 @@ struct BitLeaf {
 /// samples³ samples per voxel: differences of the counts along k, modulo 2^32.
 struct CountLeaf {
   using Carry = std::array<std::uint32_t, 64>;
-  std::array<std::uint32_t, leaf_voxels> count{};
+  std::array<std::uint32_t, volume::leaf_voxels> count{};
 
   void integrate(Carry& carry) {
     for (std::size_t column = 0; column < 64; ++column)
@@ -227,8 +227,8 @@ std::uint64_t integrate_slab(LeafMap<Leaf>& map, int samples, Slab<Leaf>& slab) 
 
 /// The runs of slab n (leaves with i = 8 (first_slab + n)) as tiles of 8³ and, where all 256
 /// columns of a node of 128³ are full, of 128³.
-std::vector<TileView> tiles_of_runs(const std::vector<std::span<const FullRun>>& runs,
-                                    std::int32_t first_slab);
+std::vector<volume::TileView> tiles_of_runs(const std::vector<std::span<const FullRun>>& runs,
+                                            std::int32_t first_slab);
 
 /// Joins the slabs, which are emptied, to a scan.
 InsideScan join_slabs(std::vector<Slab<BitLeaf>>& slabs, std::int32_t first_slab);
@@ -238,4 +238,4 @@ InsideScan join_slabs(std::vector<Slab<CountLeaf>>& slabs, std::int32_t first_sl
 /// their own lattice.
 InsideScan count_samples(const Context& context, const InsideScan& fine, int samples);
 
-} // namespace gewebe
+} // namespace gewebe::voxelization

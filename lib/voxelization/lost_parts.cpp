@@ -8,12 +8,13 @@
 #include <cmath>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::voxelization {
 namespace {
 
 class VoxelSearch {
 public:
-  explicit VoxelSearch(const Grid& grid) : info_(grid.info()), values_(grid), largest_(0x1p30) {}
+  explicit VoxelSearch(const volume::Grid& grid)
+      : info_(grid.info()), values_(grid), largest_(0x1p30) {}
 
   /// Is a voxel inside near the face?
   bool finds_inside(const TriangleMesh& mesh, const Triangle& t) {
@@ -62,12 +63,12 @@ public:
   }
 
 private:
-  const GridInfo& info_;
-  GridAccessor values_;
+  const volume::GridInfo& info_;
+  volume::GridAccessor values_;
   double largest_; // coordinate that an index can have
 };
 
-LostParts count(const TriangleMesh& mesh, const Grid& grid) {
+LostParts count(const TriangleMesh& mesh, const volume::Grid& grid) {
   DisjointSets sets(mesh.points.size());
   for (const Triangle& t : mesh.triangles) {
     sets.join(t[0], t[1]);
@@ -87,18 +88,18 @@ LostParts count(const TriangleMesh& mesh, const Grid& grid) {
 
 } // namespace
 
-LostParts find_lost_parts(const TriangleMesh& mesh, const Grid& grid) {
+LostParts find_lost_parts(const TriangleMesh& mesh, const volume::Grid& grid) {
   const LostParts as_stored = count(mesh, grid);
   if (as_stored.lost == 0) // nor is any that several of these make
     return as_stored;
   TriangleMesh welded;
   welded.points = mesh.points;
   welded.triangles = mesh.triangles;
-  weld(welded, {.mode = Weld::all, .drop_degenerate = true, .drop_unused = true});
+  repair::weld(welded, {.mode = repair::Weld::all, .drop_degenerate = true, .drop_unused = true});
   return count(welded, grid);
 }
 
-double lost_surface(const TriangleMesh& mesh, const Grid& grid) {
+double lost_surface(const TriangleMesh& mesh, const volume::Grid& grid) {
   constexpr std::uint64_t samples = 5000;
   // The next place in a triangle: a sequence that fills the square evenly, by the plastic number
   // (Roberts 2018), folded.
@@ -135,4 +136,4 @@ double lost_surface(const TriangleMesh& mesh, const Grid& grid) {
   return static_cast<double>(lost) / samples;
 }
 
-} // namespace gewebe
+} // namespace gewebe::voxelization

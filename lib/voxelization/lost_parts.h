@@ -7,7 +7,7 @@
 
 #include <cstdint>
 
-namespace gewebe {
+namespace gewebe::voxelization {
 
 struct LostParts {
   std::uint64_t parts = 0; ///< of faces connected by points at one position
@@ -18,12 +18,12 @@ struct LostParts {
 /// point of its surface lies in a cell of eight voxels with one inside. Points are sampled at most
 /// half a voxel apart. So a part that touches voxels of another part is not lost either. Faces
 /// without a finite size are left out.
-LostParts find_lost_parts(const TriangleMesh& mesh, const Grid& grid);
+LostParts find_lost_parts(const TriangleMesh& mesh, const volume::Grid& grid);
 
 /// Estimates the share of the surface's area, 0 to 1, that has no inside voxel within two voxels
 /// along each axis. Uses five thousand samples, evenly spread over the area. The result is large
 /// where walls are too thin for the voxels and break over more than a few voxels. 0 for a surface
 /// without area.
-double lost_surface(const TriangleMesh& mesh, const Grid& grid);
+double lost_surface(const TriangleMesh& mesh, const volume::Grid& grid);
 
-} // namespace gewebe
+} // namespace gewebe::voxelization

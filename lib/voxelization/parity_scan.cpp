@@ -9,7 +9,7 @@
 #include "voxelization/inside_scan_internal.h"
 #include "voxelization/triangle_chunks_internal.h"
 
-namespace gewebe {
+namespace gewebe::voxelization {
 namespace {
 
 std::int32_t floor_divide(std::int32_t n, std::int32_t by) {
@@ -27,8 +27,8 @@ struct Counters {
 void scan_chunk(const SampleMesh& mesh, const Chunks& chunks, std::int32_t chunk,
                 std::span<Slab<BitLeaf>> slabs, Counters& counters, MemoryAccount& memory) {
   std::array<LeafMap<BitLeaf>, 4> maps = leaf_maps<BitLeaf>(memory);
-  const std::int32_t first = chunk * chunks.slabs_each * leaf_dim;
-  for_each_crossing(mesh, chunks, chunk, {first, first + chunks.slabs_each * leaf_dim},
+  const std::int32_t first = chunk * chunks.slabs_each * volume::leaf_dim;
+  for_each_crossing(mesh, chunks, chunk, {first, first + chunks.slabs_each * volume::leaf_dim},
                     TieOrder::xyz, counters.exact_tests,
                     [&](std::int32_t i, std::int32_t j, std::int32_t k) {
                       const int bit = (j & 7) * 8 + (k & 7);
@@ -56,7 +56,7 @@ void scan_chunk(const SampleMesh& mesh, const Chunks& chunks, std::int32_t chunk
   constexpr std::int32_t rows_at_once = 64;
   LeafMap<CountLeaf> map(memory);
   const std::int32_t n = mesh.samples;
-  const std::int32_t first = chunk * leaf_dim * n, last = first + leaf_dim * n;
+  const std::int32_t first = chunk * volume::leaf_dim * n, last = first + volume::leaf_dim * n;
   std::vector<std::vector<std::uint64_t>> rows(rows_at_once); // crossings, j above k, both biased
   constexpr std::uint32_t bias = 0x80000000u;
   for (std::int32_t row = first; row < last; row += rows_at_once) {
@@ -148,4 +148,4 @@ InsideScan parity_scan(const Context& context, const SampleMesh& mesh, VoxelizeR
   return join_slabs(slabs, first_slab, mesh.samples);
 }
 
-} // namespace gewebe
+} // namespace gewebe::voxelization

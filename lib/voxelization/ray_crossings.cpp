@@ -4,7 +4,7 @@
 
 #include "geometry/exact_predicates.h"
 
-namespace gewebe {
+namespace gewebe::voxelization {
 
 bool past_edge(const Vec3& p, const Vec3& q, std::int32_t i, std::int32_t j,
                std::uint64_t& exact_tests) {
@@ -39,4 +39,4 @@ std::int32_t first_past_plane(const Vec3& a, const Vec3& b, const Vec3& c, Ray r
   return high;
 }
 
-} // namespace gewebe
+} // namespace gewebe::voxelization

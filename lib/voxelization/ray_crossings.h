@@ -12,7 +12,7 @@
 #include <cstdint>
 #include <utility>
 
-namespace gewebe {
+namespace gewebe::voxelization {
 
 /// Largest integer <= x. \pre |x| < 2^31
 inline std::int32_t floor_int(double x) {
@@ -152,4 +152,4 @@ void cross_triangle(const Vec3& corner0, const Vec3& corner1, const Vec3& corner
     cross_rows(EdgeLine(b, c), turn, row_end);
 }
 
-} // namespace gewebe
+} // namespace gewebe::voxelization

@@ -4,7 +4,7 @@
 
 // Errors are bounded as in ray_crossings_internal.h; a fused multiplication and addition errs less.
 
-namespace gewebe {
+namespace gewebe::voxelization {
 namespace {
 
 double absolute(double x) {
@@ -157,4 +157,4 @@ std::size_t cross_small_triangles_avx2(const TriangleList& list, std::size_t nex
   return next;
 }
 
-} // namespace gewebe
+} // namespace gewebe::voxelization

@@ -5,7 +5,7 @@
 #include <cstddef>
 #include <cstdint>
 
-namespace gewebe {
+namespace gewebe::voxelization {
 
 /// Triangles of a list, and the rows of rays that matter.
 struct TriangleList {
@@ -32,4 +32,4 @@ struct CrossingBuffer {
 std::size_t cross_small_triangles_avx2(const TriangleList& list, std::size_t next,
                                        CrossingBuffer& buffer);
 
-} // namespace gewebe
+} // namespace gewebe::voxelization

@@ -6,7 +6,7 @@
 #include <cstddef>
 #include <cstdint>
 
-namespace gewebe {
+namespace gewebe::voxelization {
 
 inline constexpr std::size_t solid_angle_lanes = 8;
 
@@ -98,4 +98,4 @@ inline std::uint32_t solid_angles(const SolidAngleTriangles& triangles, const do
 
 } // namespace
 
-} // namespace gewebe
+} // namespace gewebe::voxelization

@@ -9,7 +9,7 @@
 #include <algorithm>
 #include <cstdlib>
 
-namespace gewebe {
+namespace gewebe::voxelization {
 namespace {
 
 constexpr double pi = 3.14159265358979323846;
@@ -81,9 +81,9 @@ SolidAngleTree::SolidAngleTree(std::span<const Vec3> points, std::span<const Tri
   }
   if (triangles_.empty())
     return;
-  EdgeSides(points.size(), triangles)
-      .for_each_edge([&](std::uint32_t low, std::span<const EdgeSide> edge) {
-        for (int n = std::abs(surplus(edge)); n > 0; --n)
+  mesh::EdgeSides(points.size(), triangles)
+      .for_each_edge([&](std::uint32_t low, std::span<const mesh::EdgeSide> edge) {
+        for (int n = std::abs(mesh::surplus(edge)); n > 0; --n)
           border_.push_back({points[low], points[edge[0].high()]});
       });
   nodes_.emplace_back();
@@ -265,4 +265,4 @@ Box3 SolidAngleTree::box() const {
   return box;
 }
 
-} // namespace gewebe
+} // namespace gewebe::voxelization

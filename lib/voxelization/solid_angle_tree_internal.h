@@ -11,7 +11,7 @@
 #include <span>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::voxelization {
 
 /// Sum of solid angles / 4 pi with a bound of its error.
 struct WindingSum {
@@ -69,4 +69,4 @@ private:
   std::vector<std::array<Vec3, 2>> border_; ///< edges that the triangles leave unbalanced
 };
 
-} // namespace gewebe
+} // namespace gewebe::voxelization

@@ -6,7 +6,7 @@
 
 #include <algorithm>
 
-namespace gewebe {
+namespace gewebe::voxelization {
 namespace {
 
 /// Sample rows that a triangle may cross; empty if none.
@@ -69,7 +69,7 @@ Chunks sort_triangles(const Context& context, const SampleMesh& mesh) {
     box.min.x = std::min(box.min.x, p.x);
     box.max.x = std::max(box.max.x, p.x);
   }
-  const double slabs = (box.max.x - box.min.x) / (leaf_dim * mesh.samples) + 1;
+  const double slabs = (box.max.x - box.min.x) / (volume::leaf_dim * mesh.samples) + 1;
   Chunks chunks;
   // Samples that are counted take a list of crossings per row, so one slab is much.
   if (mesh.samples == 1)
@@ -84,7 +84,7 @@ Chunks sort_triangles(const Context& context, const SampleMesh& mesh) {
   quiet.progress = nullptr;
   parallel_blocks(quiet, mesh.triangles.size(), grain, [&](std::size_t begin, std::size_t end) {
     chunks.blocks[begin / grain] =
-        sort_block(context, mesh, begin, end, chunks.slabs_each * leaf_dim * mesh.samples);
+        sort_block(context, mesh, begin, end, chunks.slabs_each * volume::leaf_dim * mesh.samples);
   });
   chunks.range = {INT32_MAX, INT32_MIN};
   for (const Block& b : chunks.blocks)
@@ -97,4 +97,4 @@ Chunks sort_triangles(const Context& context, const SampleMesh& mesh) {
   return chunks;
 }
 
-} // namespace gewebe
+} // namespace gewebe::voxelization

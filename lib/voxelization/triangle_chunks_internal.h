@@ -11,7 +11,7 @@
 #include <span>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::voxelization {
 
 /// A mesh in the index space of the samples: coordinates as exact_predicates.h requires them,
 /// magnitudes below 2^30.
@@ -82,4 +82,4 @@ void for_each_crossing(const SampleMesh& mesh, const Chunks& chunks, std::int32_
   }
 }
 
-} // namespace gewebe
+} // namespace gewebe::voxelization

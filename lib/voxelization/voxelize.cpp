@@ -15,7 +15,7 @@
 #include <cstring>
 #include <string>
 
-namespace gewebe {
+namespace gewebe::voxelization {
 namespace {
 
 constexpr double index_limit = 1 << 30;
@@ -39,16 +39,16 @@ struct IndexMesh {
 };
 
 IndexMesh index_mesh(const Context& context, const TriangleMesh& mesh,
-                     const GridTransform& transform) {
+                     const volume::GridTransform& transform) {
   constexpr std::size_t grain = 8192;
   IndexMesh index;
   index.points.resize(mesh.points.size());
   std::vector<Extent> parts(mesh.points.size() / grain + mesh.triangles.size() / grain + 2);
   const auto blocks = [&](std::size_t count, std::size_t first, auto&& work) {
-    Context quiet = context;
+    gewebe::Context quiet = context;
     quiet.progress = nullptr;
-    parallel_blocks(quiet, count, grain, [&](std::size_t begin, std::size_t end) {
-      Extent extent;
+    gewebe::parallel_blocks(quiet, count, grain, [&](std::size_t begin, std::size_t end) {
+      gewebe::voxelization::Extent extent;
       for (std::size_t n = begin; n < end; ++n)
         work(n, extent);
       parts[first + begin / grain] = extent;
@@ -101,15 +101,16 @@ double scan_bytes(const Extent& extent, const TriangleMesh& mesh, int samples) {
     return std::fmin(std::fmax(1.75 * extent.area / (edge * edge), extent.longest / edge) + 8,
                      (size.x + 2) * (size.y + 2) * (size.z + 2));
   };
-  const double leaf_bytes = (samples == 1 ? 64 : 2 * 4 * leaf_voxels) + 4 * leaf_voxels + 200;
-  const double node_bytes = 4096.0 * (sizeof(TileView) + 8);
+  const double leaf_bytes =
+      (samples == 1 ? 64 : 2 * 4 * volume::leaf_voxels) + 4 * volume::leaf_voxels + 200;
+  const double node_bytes = 4096.0 * (sizeof(volume::TileView) + 8);
   const double solid_nodes =
       extent.box.size().x * extent.box.size().y * extent.box.size().z / 0x1p21;
   const double fine_rows = std::fmin(64, 8 * samples), slabs = extent.box.size().x / 8 + 1;
   const double crossings_at_once =
       extent.area * samples * samples / slabs * fine_rows / (8 * samples);
   const double top_bytes = 32768 * 8.25; // a node of 4096³ voxels, one for each octant at least
-  return cells(leaf_dim) * leaf_bytes + cells(128) * node_bytes + cells(4096) * top_bytes +
+  return cells(volume::leaf_dim) * leaf_bytes + cells(128) * node_bytes + cells(4096) * top_bytes +
          solid_nodes * 40 + 200 * slabs + (samples == 1 ? 0 : 64 * crossings_at_once) +
          60.0 * static_cast<double>(mesh.points.size() + mesh.triangles.size());
 }
@@ -125,11 +126,12 @@ constexpr std::array<std::array<float, 8>, 256> floats_of_bits() {
 
 } // namespace
 
-double voxelize_bytes(const TriangleMesh& mesh, const GridTransform& transform, int samples) {
+double voxelize_bytes(const TriangleMesh& mesh, const volume::GridTransform& transform,
+                      int samples) {
   return scan_bytes(index_mesh(Context{}, mesh, transform).extent, mesh, samples);
 }
 
-void check_voxelize_input(const TriangleMesh& mesh, const GridTransform& transform) {
+void check_voxelize_input(const TriangleMesh& mesh, const volume::GridTransform& transform) {
   if (mesh.triangles.empty())
     throw Error("the mesh has no triangle, expected at least one");
   if (const double edge = transform.voxel_size().x; !(edge >= 1e-100 && edge <= 1e100))
@@ -141,7 +143,7 @@ void check_voxelize_input(const TriangleMesh& mesh, const GridTransform& transfo
 }
 
 InsideScan scan_inside(const Context& context, const TriangleMesh& mesh,
-                       const GridTransform& transform, const VoxelizeOptions& options,
+                       const volume::GridTransform& transform, const VoxelizeOptions& options,
                        VoxelizeReport* report) {
   if (options.samples < 1 || options.samples > 64)
     throw Error("voxelize: " + std::to_string(options.samples) +
@@ -159,12 +161,12 @@ InsideScan scan_inside(const Context& context, const TriangleMesh& mesh,
   r = {};
   r.triangles = mesh.triangles.size();
   const auto look_at_border = [&] {
-    if (closed_by_index(index.points.size(), mesh.triangles))
+    if (mesh::closed_by_index(index.points.size(), mesh.triangles))
       return std::vector<std::array<std::uint32_t, 2>>();
-    auto border = odd_edges(index.points, mesh.triangles);
+    auto border = mesh::odd_edges(index.points, mesh.triangles);
     r.boundary_edges = border.size();
     std::vector<std::uint32_t> group;
-    r.holes = edge_groups(border, group);
+    r.holes = mesh::edge_groups(border, group);
     return border;
   };
   SampleMesh samples{options.samples, index.points, mesh.triangles, context.cpu};
@@ -174,7 +176,7 @@ InsideScan scan_inside(const Context& context, const TriangleMesh& mesh,
     if (const auto border = look_at_border();
         options.on_open == OpenMesh::fill && !border.empty()) {
       closed = mesh.triangles;
-      close_with_cones(border, index.points, closed);
+      mesh::close_with_cones(border, index.points, closed);
       samples.points = index.points;
       samples.triangles = closed;
     }
@@ -204,14 +206,14 @@ InsideScan scan_inside(const Context& context, const TriangleMesh& mesh,
   return scan;
 }
 
-Grid grid_from_scan(const Context& context, const InsideScan& scan,
-                    const GridTransform& transform) {
-  GridInfo info;
+volume::Grid grid_from_scan(const Context& context, const InsideScan& scan,
+                            const volume::GridTransform& transform) {
+  volume::GridInfo info;
   info.transform = transform;
-  GridBuilder builder(info);
-  for (const TileView& tile : scan.tiles)
+  volume::GridBuilder builder(info);
+  for (const volume::TileView& tile : scan.tiles)
     builder.add_tile(tile);
-  const std::vector<LeafRef> leaves = builder.add_leaves(context, scan.origins);
+  const std::vector<volume::LeafRef> leaves = builder.add_leaves(context, scan.origins);
   static constexpr std::array<std::array<float, 8>, 256> floats = floats_of_bits();
   const double full = scan.samples * scan.samples * scan.samples;
   parallel_blocks(context, leaves.size(), 1024, [&](std::size_t begin, std::size_t end) {
@@ -236,9 +238,26 @@ Grid grid_from_scan(const Context& context, const InsideScan& scan,
   return builder.finish(false);
 }
 
-Grid voxelize(const Context& context, const TriangleMesh& mesh, const GridTransform& transform,
-              const VoxelizeOptions& options, VoxelizeReport* report) {
+volume::Grid voxelize(const Context& context, const TriangleMesh& mesh,
+                      const volume::GridTransform& transform, const VoxelizeOptions& options,
+                      VoxelizeReport* report) {
   return grid_from_scan(context, scan_inside(context, mesh, transform, options, report), transform);
 }
 
-} // namespace gewebe
+void close_or_refuse(const Context& context, const TriangleMesh& mesh,
+                     const volume::GridTransform& transform, OpenMesh on_open,
+                     std::vector<Vec3>& points, std::vector<Triangle>& triangles,
+                     VoxelizeReport& report) {
+  const auto border = mesh::odd_edges(points, triangles);
+  report.boundary_edges = border.size();
+  if (border.empty())
+    return;
+  std::vector<std::uint32_t> group;
+  report.holes = mesh::edge_groups(border, group);
+  if (on_open == OpenMesh::refuse)
+    scan_inside(context, mesh, transform, {}); // refuses it, with the number of odd rays
+  if (on_open == OpenMesh::fill)
+    mesh::close_with_cones(border, points, triangles);
+}
+
+} // namespace gewebe::voxelization

@@ -15,7 +15,7 @@
 #include <cstdint>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::voxelization {
 
 /// What becomes of a mesh that has boundary edges.
 enum class OpenMesh {
@@ -59,7 +59,7 @@ struct VoxelizeReport {
 struct WindingRun {
   Int3 origin{};          ///< of the lowest
   std::int32_t k_end = 0; ///< voxels, exclusive
-  std::array<std::int16_t, leaf_voxels> winding{};
+  std::array<std::int16_t, volume::leaf_voxels> winding{};
 };
 
 /// The samples inside, kept as bits or counts: only what the surface touches is stored voxel by
@@ -69,9 +69,9 @@ struct InsideScan {
   std::vector<Int3> origins; ///< of leaves neither wholly outside nor inside, ascending
   std::vector<std::array<std::uint64_t, 8>>
       bits; ///< per leaf, if samples == 1: bit n of word w is offset 64 w + n
-  std::vector<std::array<std::uint32_t, leaf_voxels>>
-      counts;                  ///< per leaf, if samples > 1: of samples³
-  std::vector<TileView> tiles; ///< wholly inside, dim 8 or 128, value 1
+  std::vector<std::array<std::uint32_t, volume::leaf_voxels>>
+      counts;                          ///< per leaf, if samples > 1: of samples³
+  std::vector<volume::TileView> tiles; ///< wholly inside, dim 8 or 128, value 1
   /// Where winding numbers other than 0 and 1 occur, ascending by origin; elsewhere they are the
   /// bits. Near a hole they are rounded, 0 outside.
   std::vector<WindingRun> windings;
@@ -79,21 +79,24 @@ struct InsideScan {
 
 /// Bytes that `voxelize` will need at most for meshes of ordinary shape: from the surface's area in
 /// voxels.
-double voxelize_bytes(const TriangleMesh& mesh, const GridTransform& transform, int samples);
+double voxelize_bytes(const TriangleMesh& mesh, const volume::GridTransform& transform,
+                      int samples);
 
 /// Which samples of the lattice are inside `mesh`. The result is the same for any number of
 /// threads. \pre check_mesh(mesh) passes \throw Error if the mesh has no triangle, the lattice
 /// isn't cubic, an index would leave ±2^30, the memory doesn't suffice, or the mesh is open and
 /// options.on_open is `refuse`
 InsideScan scan_inside(const Context& context, const TriangleMesh& mesh,
-                       const GridTransform& transform, const VoxelizeOptions& options,
+                       const volume::GridTransform& transform, const VoxelizeOptions& options,
                        VoxelizeReport* report = nullptr);
 
 /// The scan as a fog volume: background 0, isovalue 0.5, active where the value isn't 0.
-Grid grid_from_scan(const Context& context, const InsideScan& scan, const GridTransform& transform);
+volume::Grid grid_from_scan(const Context& context, const InsideScan& scan,
+                            const volume::GridTransform& transform);
 
 /// Both. \throw Error as scan_inside
-Grid voxelize(const Context& context, const TriangleMesh& mesh, const GridTransform& transform,
-              const VoxelizeOptions& options, VoxelizeReport* report = nullptr);
+volume::Grid voxelize(const Context& context, const TriangleMesh& mesh,
+                      const volume::GridTransform& transform, const VoxelizeOptions& options,
+                      VoxelizeReport* report = nullptr);
 
-} // namespace gewebe
+} // namespace gewebe::voxelization

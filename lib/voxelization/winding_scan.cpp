@@ -9,7 +9,7 @@
 #include "voxelization/inside_scan_internal.h"
 #include "voxelization/solid_angle_tree_internal.h"
 
-namespace gewebe {
+namespace gewebe::voxelization {
 namespace {
 
 constexpr double diagonal = 1.7320508075688774;
@@ -25,8 +25,8 @@ std::vector<Int3> leaves_near(const Context& context, const SolidAngleTree& cone
   std::int32_t side = 1;
   for (int a = 0; a < 3; ++a) {
     low[static_cast<std::size_t>(a)] =
-        static_cast<std::int32_t>(std::floor((box.min[a] - reach) / leaf_dim));
-    while (low[static_cast<std::size_t>(a)] + side < (box.max[a] + reach) / leaf_dim + 1)
+        static_cast<std::int32_t>(std::floor((box.min[a] - reach) / volume::leaf_dim));
+    while (low[static_cast<std::size_t>(a)] + side < (box.max[a] + reach) / volume::leaf_dim + 1)
       side *= 2;
   }
   struct Cube {
@@ -38,9 +38,10 @@ std::vector<Int3> leaves_near(const Context& context, const SolidAngleTree& cone
     const Cube cube = cubes.back();
     cubes.pop_back();
     // Half a cube from the middle of the first to that of the last voxel.
-    const double half = (leaf_dim * static_cast<double>(cube.side) - 1) / 2;
-    const Vec3 middle = Vec3{1.0 * cube.low[0], 1.0 * cube.low[1], 1.0 * cube.low[2]} * leaf_dim +
-                        Vec3{half, half, half};
+    const double half = (volume::leaf_dim * static_cast<double>(cube.side) - 1) / 2;
+    const Vec3 middle =
+        Vec3{1.0 * cube.low[0], 1.0 * cube.low[1], 1.0 * cube.low[2]} * volume::leaf_dim +
+        Vec3{half, half, half};
     const WindingSum sum = cones.within(middle, half * diagonal);
     if (std::fabs(sum.value) + sum.error < 0.5)
       continue;
@@ -77,7 +78,7 @@ struct Counters {
 /// Winding numbers of a leaf to bits.
 BitLeaf bits_of(const CountLeaf& leaf) {
   BitLeaf bits;
-  for (std::size_t v = 0; v < leaf_voxels; ++v)
+  for (std::size_t v = 0; v < volume::leaf_voxels; ++v)
     bits.word[v / 64] |= std::uint64_t{leaf.count[v] != 0} << (v % 64);
   return bits;
 }
@@ -90,8 +91,8 @@ void decide(const SolidAngleTree& cones, const CountLeaf& leaf, const Int3& orig
   const Vec3 middle{origin[0] + low[0] + half, origin[1] + low[1] + half,
                     origin[2] + low[2] + half};
   const auto place = [&](std::int32_t n) { // the samples of the cube
-    return static_cast<std::size_t>(
-        leaf_offset({low[0] + n / (side * side), low[1] + n / side % side, low[2] + n % side}));
+    return static_cast<std::size_t>(volume::leaf_offset(
+        {low[0] + n / (side * side), low[1] + n / side % side, low[2] + n % side}));
   };
   const auto whole = [&](std::size_t at) { return static_cast<std::int32_t>(leaf.count[at]); };
   const auto set = [&](std::size_t at, bool inside) {
@@ -125,7 +126,7 @@ void keep(const CountLeaf& leaf, const BitLeaf& bits, std::int32_t slab_i, LeafK
           std::int32_t k_end, std::vector<WindingRun>& runs) {
   WindingRun run;
   bool others = false;
-  for (std::size_t v = 0; v < leaf_voxels; ++v) {
+  for (std::size_t v = 0; v < volume::leaf_voxels; ++v) {
     if ((bits.word[v / 64] >> (v % 64) & 1) == 0)
       continue;
     const auto whole = static_cast<std::int32_t>(leaf.count[v]);
@@ -134,8 +135,8 @@ void keep(const CountLeaf& leaf, const BitLeaf& bits, std::int32_t slab_i, LeafK
   }
   if (!others)
     return;
-  run.origin = {slab_i * leaf_dim, from.j * leaf_dim, from.k * leaf_dim};
-  run.k_end = k_end * leaf_dim;
+  run.origin = {slab_i * volume::leaf_dim, from.j * volume::leaf_dim, from.k * volume::leaf_dim};
+  run.k_end = k_end * volume::leaf_dim;
   runs.push_back(run);
 }
 
@@ -169,8 +170,9 @@ Slab<BitLeaf> integrate(LeafMap<CountLeaf>& map, std::int32_t slab_i, std::span<
     leaf.integrate(carry); // 0 again past the last leaf: every ray leaves as often as it enters
     BitLeaf bits;
     if (std::binary_search(near.begin(), near.end(), Int3{slab_i, key.j, key.k}))
-      decide(cones, leaf, {slab_i * leaf_dim, key.j * leaf_dim, key.k * leaf_dim}, {0, 0, 0},
-             leaf_dim, bits, counters.summed);
+      decide(cones, leaf,
+             {slab_i * volume::leaf_dim, key.j * volume::leaf_dim, key.k * volume::leaf_dim},
+             {0, 0, 0}, volume::leaf_dim, bits, counters.summed);
     else
       bits = bits_of(leaf);
     slab.put(bits, key, key.k + 1, full);
@@ -185,12 +187,12 @@ Slab<BitLeaf> integrate(LeafMap<CountLeaf>& map, std::int32_t slab_i, std::span<
 InsideScan winding_scan(const Context& context, std::vector<Vec3>& points,
                         std::span<const Triangle> triangles, std::span<const std::int32_t> part,
                         bool keep_windings, VoxelizeReport& report) {
-  const OrientedSurface surface = orient_surface(points, triangles, part);
+  const repair::OrientedSurface surface = repair::orient_surface(points, triangles, part);
   report.parts = surface.parts;
   report.parts_turned = surface.parts_turned;
   report.triangles_turned = surface.triangles_turned;
   report.triangles_duplicate = surface.triangles_duplicate;
-  const ClosingCones caps = closing_cones(points, surface.triangles);
+  const repair::ClosingCones caps = repair::closing_cones(points, surface.triangles);
   for (Vec3& p : points)
     p = {predicate_coordinate(p.x), predicate_coordinate(p.y), predicate_coordinate(p.z)};
   const SolidAngleTree cones(points, caps.cones, caps.pieces, context.cpu);
@@ -242,11 +244,12 @@ InsideScan winding_scan(const Context& context, std::vector<Vec3>& points,
     for (std::size_t n = begin; n < end; ++n) {
       std::array<LeafMap<CountLeaf>, 4> maps = leaf_maps<CountLeaf>(memory);
       const std::int32_t chunk = range.begin + static_cast<std::int32_t>(n);
-      const std::int32_t first = chunk * each * leaf_dim;
+      const std::int32_t first = chunk * each * volume::leaf_dim;
       for (std::size_t way = 0; way < 2; ++way)
         for_each_crossing(
-            meshes[way], chunks[way], chunk, {first, first + each * leaf_dim}, TieOrder::xyz,
-            counters[n].exact_tests, [&](std::int32_t i, std::int32_t j, std::int32_t k) {
+            meshes[way], chunks[way], chunk, {first, first + each * volume::leaf_dim},
+            TieOrder::xyz, counters[n].exact_tests,
+            [&](std::int32_t i, std::int32_t j, std::int32_t k) {
               maps[static_cast<std::size_t>((i - first) >> 3)]
                   .at({j >> 3, k >> 3})
                   .count[static_cast<std::size_t>((i & 7) << 6 | (j & 7) << 3 | (k & 7))] +=
@@ -278,4 +281,4 @@ InsideScan winding_scan(const Context& context, std::vector<Vec3>& points,
   return scan;
 }
 
-} // namespace gewebe
+} // namespace gewebe::voxelization

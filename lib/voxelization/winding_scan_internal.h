@@ -11,7 +11,7 @@
 #include "voxelization/triangle_chunks_internal.h"
 #include "voxelization/voxelize.h"
 
-namespace gewebe {
+namespace gewebe::voxelization {
 
 /// `points` gets the tips of the cones. Ties are decided as by the parity rule. Adds to the report
 /// what orientation found, triangles_skipped, crossings, exact_tests, and samples_summed.
@@ -21,4 +21,4 @@ InsideScan winding_scan(const Context& context, std::vector<Vec3>& points,
                         std::span<const Triangle> triangles, std::span<const std::int32_t> part,
                         bool keep_windings, VoxelizeReport& report);
 
-} // namespace gewebe
+} // namespace gewebe::voxelization

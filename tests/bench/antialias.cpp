@@ -46,8 +46,8 @@ const Context one_thread = [] {
 
 struct Filter {
   std::string name;
-  std::function<Grid()> work;
-  Grid grid;
+  std::function<volume::Grid()> work;
+  volume::Grid grid;
 };
 
 /// Runs all filters in turn, round by round, so that a busy machine is busy for all of them. Times
@@ -57,7 +57,7 @@ std::vector<Times> measure(std::vector<Filter>& filters) {
   std::vector<std::vector<double>> times(filters.size());
   for (int run = 0; run < runs; ++run)
     for (std::size_t n = 0; n < filters.size(); ++n) {
-      filters[n].grid = Grid();
+      filters[n].grid = volume::Grid();
       const double start = now();
       filters[n].grid = filters[n].work();
       times[n].push_back(now() - start);
@@ -97,19 +97,19 @@ std::int32_t coarse(std::int32_t fine) {
 
 /// The binary volume at 768³, then the means of 6³ of its voxels, as section 4.1 of the report
 /// says.
-Grid literally(const TriangleMesh& mesh, const GridTransform& lattice) {
-  GridTransform fine = lattice; // sample f at (f + ½)/6 - ½
+volume::Grid literally(const TriangleMesh& mesh, const volume::GridTransform& lattice) {
+  volume::GridTransform fine = lattice; // sample f at (f + ½)/6 - ½
   for (std::size_t row = 0; row < 3; ++row) {
     for (std::size_t a = 0; a < 3; ++a) {
       fine.m[4 * row + 3] += lattice.m[4 * row + a] * (0.5 / report_samples - 0.5);
       fine.m[4 * row + a] /= report_samples;
     }
   }
-  const Grid grid = voxelize(one_thread, mesh, fine, {});
+  const volume::Grid grid = voxelization::voxelize(one_thread, mesh, fine, {});
   Int3 min{}, max{};
-  GridInfo info;
+  volume::GridInfo info;
   info.transform = lattice;
-  GridBuilder builder(info);
+  volume::GridBuilder builder(info);
   if (!grid.active_box(min, max))
     return builder.finish();
   Int3 low{}, high{};
@@ -134,20 +134,20 @@ Grid literally(const TriangleMesh& mesh, const GridTransform& lattice) {
         }
       }
   };
-  for (const TileView& tile : grid.tiles())
+  for (const volume::TileView& tile : grid.tiles())
     add_cube(tile.origin, tile.dim, [](std::int32_t, std::int32_t, std::int32_t) { return 1; });
-  for (const LeafView& leaf : grid.leaves())
-    add_cube(leaf.origin, leaf_dim, [&](std::int32_t i, std::int32_t j, std::int32_t k) {
+  for (const volume::LeafView& leaf : grid.leaves())
+    add_cube(leaf.origin, volume::leaf_dim, [&](std::int32_t i, std::int32_t j, std::int32_t k) {
       return leaf.values[64 * i + 8 * j + k] > 0.5f ? 1 : 0;
     });
   std::vector<Int3> origins;
-  for (std::int32_t i = low[0]; i < high[0]; i += leaf_dim)
-    for (std::int32_t j = low[1]; j < high[1]; j += leaf_dim)
-      for (std::int32_t k = low[2]; k < high[2]; k += leaf_dim)
+  for (std::int32_t i = low[0]; i < high[0]; i += volume::leaf_dim)
+    for (std::int32_t j = low[1]; j < high[1]; j += volume::leaf_dim)
+      for (std::int32_t k = low[2]; k < high[2]; k += volume::leaf_dim)
         origins.push_back({i, j, k});
   constexpr int full = report_samples * report_samples * report_samples;
-  for (const LeafRef& leaf : builder.add_leaves(one_thread, origins))
-    for (std::int32_t v = 0; v < leaf_voxels; ++v) {
+  for (const volume::LeafRef& leaf : builder.add_leaves(one_thread, origins))
+    for (std::int32_t v = 0; v < volume::leaf_voxels; ++v) {
       const std::uint8_t count =
           counts.row(leaf.origin[0] + (v >> 6),
                      leaf.origin[1] + (v >> 3 & 7))[leaf.origin[2] + (v & 7) - counts.k_min()];
@@ -163,7 +163,7 @@ struct Range {
   Int3 min, max;
 };
 
-Range range_of(const TriangleMesh& mesh, const GridTransform& lattice) {
+Range range_of(const TriangleMesh& mesh, const volume::GridTransform& lattice) {
   Range range{{INT32_MAX, INT32_MAX, INT32_MAX}, {INT32_MIN, INT32_MIN, INT32_MIN}};
   for (const Vec3& point : mesh.points) {
     const Vec3 p = lattice.to_index(point);
@@ -198,8 +198,8 @@ Error2 fraction_error(const Range& range, const std::function<double(const Int3&
   return error;
 }
 
-std::function<double(const Int3&)> values_of(const Grid& grid) {
-  return [accessor = std::make_shared<GridAccessor>(grid)](const Int3& ijk) {
+std::function<double(const Int3&)> values_of(const volume::Grid& grid) {
+  return [accessor = std::make_shared<volume::GridAccessor>(grid)](const Int3& ijk) {
     return static_cast<double>(accessor->value(ijk));
   };
 }
@@ -207,7 +207,7 @@ std::function<double(const Int3&)> values_of(const Grid& grid) {
 /// Distances to a mesh of points that are near it, in voxels.
 class Distances {
 public:
-  Distances(const TriangleMesh& mesh, const GridTransform& lattice)
+  Distances(const TriangleMesh& mesh, const volume::GridTransform& lattice)
       : triangles_(mesh.triangles), lattice_(lattice) {
     for (const Vec3& p : mesh.points)
       points_.push_back(lattice.to_index(p));
@@ -244,16 +244,17 @@ private:
   }
   double to(std::uint32_t n, const Vec3& p) const {
     const Triangle& t = triangles_[n];
-    return norm(p - nearest_on_triangle(p, points_[t[0]], points_[t[1]], points_[t[2]]).point);
+    return norm(p -
+                mesh::nearest_on_triangle(p, points_[t[0]], points_[t[1]], points_[t[2]]).point);
   }
   const std::vector<Triangle>& triangles_;
-  GridTransform lattice_;
+  volume::GridTransform lattice_;
   std::vector<Vec3> points_;
   std::map<Int3, std::vector<std::uint32_t>> near_;
 };
 
-Error2 position_error(const Distances& distances, const Grid& grid) {
-  const IsoSurface surface = marching_cubes({}, grid);
+Error2 position_error(const Distances& distances, const volume::Grid& grid) {
+  const surface::IsoSurface surface = surface::marching_cubes({}, grid);
   Error2 error;
   for (const Vec3& p : surface.mesh.points) {
     const double d = distances.at(p);
@@ -266,9 +267,9 @@ Error2 position_error(const Distances& distances, const Grid& grid) {
 // ---- one mesh
 
 /// The slice through the middle across the second axis, a voxel 4 x 4 pixels, black to white.
-Image slice(const Range& range, const std::function<double(const Int3&)>& value) {
+texture::Image slice(const Range& range, const std::function<double(const Int3&)>& value) {
   constexpr std::int32_t edge = 4;
-  Image image;
+  texture::Image image;
   image.width = static_cast<std::uint32_t>(edge * (range.max[0] - range.min[0] + 1));
   image.height = static_cast<std::uint32_t>(edge * (range.max[2] - range.min[2] + 1));
   const std::int32_t j = (range.min[1] + range.max[1]) / 2;
@@ -281,64 +282,72 @@ Image slice(const Range& range, const std::function<double(const Int3&)>& value)
   return image;
 }
 
-std::vector<Filter> filters_of(const TriangleMesh& mesh, const GridTransform& lattice) {
-  constexpr auto refuse = OpenMesh::refuse;
+std::vector<Filter> filters_of(const TriangleMesh& mesh, const volume::GridTransform& lattice) {
+  constexpr auto refuse = voxelization::OpenMesh::refuse;
   std::vector<Filter> filters;
-  filters.push_back(
-      {"exact",
-       [&mesh, &lattice] { return *exact_coverage(one_thread, mesh, lattice, refuse); },
-       {}});
+  filters.push_back({"exact",
+                     [&mesh, &lattice] {
+                       return *antialiasing::exact_coverage(one_thread, mesh, lattice, refuse);
+                     },
+                     {}});
   for (const int n : {2, 4, 6})
-    filters.push_back(
-        {"lines:" + std::to_string(n),
-         [&mesh, &lattice, n] { return line_coverage(one_thread, mesh, lattice, n, refuse); },
-         {}});
+    filters.push_back({"lines:" + std::to_string(n),
+                       [&mesh, &lattice, n] {
+                         return antialiasing::line_coverage(one_thread, mesh, lattice, n, refuse);
+                       },
+                       {}});
   for (const int n : {2, 4, 6, 8})
     filters.push_back({"box:" + std::to_string(n),
                        [&mesh, &lattice, n] {
-                         VoxelizeOptions options;
+                         voxelization::VoxelizeOptions options;
                          options.samples = n;
-                         return voxelize(one_thread, mesh, lattice, options);
+                         return voxelization::voxelize(one_thread, mesh, lattice, options);
                        },
                        {}});
-  filters.push_back({"jones",
-                     [&mesh, &lattice] { return jones_density(one_thread, mesh, lattice, refuse); },
+  filters.push_back(
+      {"jones",
+       [&mesh, &lattice] { return antialiasing::jones_density(one_thread, mesh, lattice, refuse); },
+       {}});
+  filters.push_back({"sramek",
+                     [&mesh, &lattice] {
+                       return antialiasing::sramek_density(one_thread, mesh, lattice, refuse);
+                     },
                      {}});
   filters.push_back(
-      {"sramek",
-       [&mesh, &lattice] { return sramek_density(one_thread, mesh, lattice, refuse); },
+      {"none",
+       [&mesh, &lattice] { return voxelization::voxelize(one_thread, mesh, lattice, {}); },
        {}});
-  filters.push_back(
-      {"none", [&mesh, &lattice] { return voxelize(one_thread, mesh, lattice, {}); }, {}});
   filters.push_back({"768 to 128", [&mesh, &lattice] { return literally(mesh, lattice); }, {}});
   return filters;
 }
 
 void draw(const std::string& folder, const std::string& name, const TriangleMesh& mesh) {
-  const GridTransform lattice = lattice_for_dim(bounding_box(mesh), dim);
+  const volume::GridTransform lattice = volume::lattice_for_dim(bounding_box(mesh), dim);
   for (const Filter& filter : filters_of(mesh, lattice)) {
     std::string file = filter.name;
     std::ranges::replace_if(
         file, [](char c) { return c == ' ' || c == ':'; }, '-');
-    Output output(folder + "/" + name + "-" + file + ".png", {});
-    write_image(output, slice(range_of(mesh, lattice), values_of(filter.work())), Kind::png);
+    formats::Output output(folder + "/" + name + "-" + file + ".png", {});
+    formats::write_image(output, slice(range_of(mesh, lattice), values_of(filter.work())),
+                         formats::Kind::png);
     output.commit();
   }
 }
 
 void bench(const char* name, const TriangleMesh& mesh) {
-  const GridTransform lattice = lattice_for_dim(bounding_box(mesh), dim);
+  const volume::GridTransform lattice = volume::lattice_for_dim(bounding_box(mesh), dim);
   std::vector<Filter> filters = filters_of(mesh, lattice);
   const std::vector<Times> times = measure(filters);
 
   // How far rounding goes in `exact` itself: the sums run along another axis.
-  GridTransform rotated = lattice;
+  volume::GridTransform rotated = lattice;
   for (std::size_t row = 0; row < 3; ++row) {
     rotated.m[4 * row] = lattice.m[4 * row + 1];
     rotated.m[4 * row + 1] = lattice.m[4 * row + 2];
     rotated.m[4 * row + 2] = lattice.m[4 * row];
   }
-  const Grid other = *exact_coverage(one_thread, mesh, rotated, OpenMesh::refuse);
+  const volume::Grid other =
+      *antialiasing::exact_coverage(one_thread, mesh, rotated, voxelization::OpenMesh::refuse);
   const auto exact = values_of(filters[0].grid);
   const Range range = range_of(mesh, lattice);
   const Distances distances(mesh, lattice);
@@ -358,7 +367,7 @@ void bench(const char* name, const TriangleMesh& mesh) {
     const Error2 fraction = fraction_error(range, tested, exact);
     row("fraction mean", fraction.mean, "mean error of a surface voxel's fraction");
     row("fraction max", fraction.max, "largest error of a voxel's fraction");
-    row("volume", std::fabs(volume_stats(one_thread, filter.grid).volume / volume - 1),
+    row("volume", std::fabs(volume::volume_stats(one_thread, filter.grid).volume / volume - 1),
         "relative error of the volume");
     const Error2 position = position_error(distances, filter.grid);
     row("position mean", position.mean, "mean distance of the isosurface in voxels");
@@ -383,11 +392,11 @@ TriangleMesh organ(const char* file, bool tube) {
   const std::string path = test::shared_folder() + "/data/" + file;
   if (!std::filesystem::exists(path))
     return made(tube);
-  Input input(path);
-  MeshReadOptions options;
-  options.kind = input_kind(input.peek(4096), path, "");
+  formats::Input input(path);
+  formats::MeshReadOptions options;
+  options.kind = formats::input_kind(input.peek(4096), path, "");
   options.drop_unused = true;
-  return read_mesh(input, options);
+  return formats::read_mesh(input, options);
 }
 
 } // namespace

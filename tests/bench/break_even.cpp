@@ -43,6 +43,7 @@
 #include <vector>
 
 using namespace gewebe;
+using namespace gewebe::test;
 using namespace gewebe::timing;
 
 namespace {
@@ -52,7 +53,7 @@ constexpr std::size_t max_contacts = 200;
 
 struct Organ {
   std::string name;
-  Model model;
+  model::Model model;
   bool still = false; // elastostatic in the hybrid scene
 };
 struct Scene {
@@ -82,9 +83,9 @@ Scene example() {
                            "':\"$PATH\" make -s -C '" + folder + "' models >/dev/null";
   if (std::system(make.c_str()) == 0)
     for (const char* const name : {"liver", "intestine", "arteries", "ducts", "gallbladder"}) {
-      Input input(folder + "/" + name + ".ela", false);
+      formats::Input input(folder + "/" + name + ".ela", false);
       scene.organs.push_back(
-          {name, read_ela(input, Context{}), std::string(name) != "gallbladder"});
+          {name, formats::read_ela(input, Context{}), std::string(name) != "gallbladder"});
     }
   std::filesystem::remove_all(folder);
   if (scene.organs.empty())
@@ -92,10 +93,10 @@ Scene example() {
   return scene;
 }
 
-Model organ_of(const std::string& path, const char* unit, std::int32_t part) {
-  Input input(path);
-  const Kind kind = input_kind(input.peek(4096), path, "");
-  TriangleMesh mesh = read_mesh(input, {kind, unit, weld_from_name("auto")});
+model::Model organ_of(const std::string& path, const char* unit, std::int32_t part) {
+  formats::Input input(path);
+  const formats::Kind kind = formats::input_kind(input.peek(4096), path, "");
+  TriangleMesh mesh = formats::read_mesh(input, {kind, unit, formats::weld_from_name("auto")});
   if (part >= 0) {
     std::vector<Triangle> kept;
     for (std::size_t t = 0; t < mesh.triangles.size(); ++t)
@@ -106,9 +107,9 @@ Model organ_of(const std::string& path, const char* unit, std::int32_t part) {
     one.triangles = std::move(kept);
     mesh = std::move(one);
   }
-  BuildOptions options;
+  model::BuildOptions options;
   options.bend = true;
-  return build_model(mesh, options, Context{}).model; // points of other parts are left out
+  return model::build_model(mesh, options, Context{}).model; // points of other parts are left out
 }
 
 Scene shared_organs() {
@@ -147,11 +148,11 @@ double share(const Scene& scene, const std::vector<bool>& still) {
 }
 
 /// Free nodes of the surface, the nearest to the first of them first.
-std::vector<std::uint32_t> patch(const Model& model) {
+std::vector<std::uint32_t> patch(const model::Model& model) {
   std::vector<std::uint32_t> nodes;
-  const std::size_t surface = surface_count(model);
+  const std::size_t surface = model::surface_count(model);
   for (std::uint32_t i = 0; i < surface; ++i)
-    if (model.nodes[i].fixed == fixed_none)
+    if (model.nodes[i].fixed == model::fixed_none)
       nodes.push_back(i);
   const Vec3 middle = model.nodes[nodes[nodes.size() / 2]].position;
   std::ranges::stable_sort(nodes, {}, [&](std::uint32_t i) {
@@ -165,19 +166,19 @@ std::vector<std::uint32_t> patch(const Model& model) {
 class Stored {
 public:
   enum class Kept { float64, float32, compressed };
-  Stored(const Model& model, std::vector<std::uint32_t> nodes, Kept kept) {
+  Stored(const model::Model& model, std::vector<std::uint32_t> nodes, Kept kept) {
     std::ranges::sort(nodes);
     const Context context = with_threads(0);
     {
-      Output output(file_.path(), {});
-      StiffnessStoreWriter writer(output);
-      const StiffnessMatrix matrix = stiffness_matrix(model);
-      StiffnessCheck check;
-      const Factor factor = checked_factor(model, matrix, context, check);
-      StiffnessFacts facts;
+      formats::Output output(file_.path(), {});
+      formats::StiffnessStoreWriter writer(output);
+      const linalg::StiffnessMatrix matrix = fem::stiffness_matrix(model);
+      linalg::StiffnessCheck check;
+      const linalg::Factor factor = linalg::checked_factor(model, matrix, context, check);
+      formats::StiffnessFacts facts;
       facts.object = "organ";
-      facts.hash = stiffness_hash(model);
-      facts.rest = rest_hash(model);
+      facts.hash = formats::stiffness_hash(model);
+      facts.rest = formats::rest_hash(model);
       facts.nodes = model.nodes.size();
       facts.order = matrix.order();
       facts.norm = check.norm;
@@ -185,16 +186,16 @@ public:
       facts.single = kept == Kept::float32;
       facts.compressed = kept == Kept::compressed ? 1e-6 : 0;
       const auto missing = writer.begin(facts, matrix, factor, nodes);
-      const auto columns_of = [&](std::span<const std::uint32_t> some, ColumnSink& sink) {
-        return compliance_columns(matrix, factor, check.norm, some, context, sink);
+      const auto columns_of = [&](std::span<const std::uint32_t> some, columns::ColumnSink& sink) {
+        return columns::compliance_columns(matrix, factor, check.norm, some, context, sink);
       };
       double residual = 0;
       if (kept == Kept::compressed) {
         std::vector<Vec3> positions;
-        for (const Node& node : model.nodes)
+        for (const model::Node& node : model.nodes)
           positions.push_back(node.position);
-        const CompressedMade made =
-            compress_columns(positions, nodes, facts.compressed, columns_of, context);
+        const columns::CompressedMade made =
+            columns::compress_columns(positions, nodes, facts.compressed, columns_of, context);
         writer.write_compressed(made);
         residual = made.residual;
       } else {
@@ -204,19 +205,20 @@ public:
       writer.close();
       output.commit();
     }
-    store_ = std::make_shared<StiffnessStore>(file_.path());
+    store_ = std::make_shared<formats::StiffnessStore>(file_.path());
     facts_ = store_->facts(model);
   }
 
-  std::shared_ptr<ComplianceSource> compliance() const {
-    return compliance_of_store({store_->columns(facts_),
-                                [store = store_, facts = facts_] { return store->factor(facts); }});
+  std::shared_ptr<compliance::ComplianceSource> compliance() const {
+    return compliance::compliance_of_store(
+        {store_->columns(facts_),
+         [store = store_, facts = facts_] { return store->factor(facts); }});
   }
 
 private:
   ScratchFile file_{".h5"};
-  std::shared_ptr<StiffnessStore> store_;
-  StiffnessFacts facts_;
+  std::shared_ptr<formats::StiffnessStore> store_;
+  formats::StiffnessFacts facts_;
 };
 
 // ---- cycles
@@ -247,19 +249,20 @@ public:
         continue;
       if (i == scene.touched)
         touched_ = simulation_.object_count();
-      std::shared_ptr<ComplianceSource> source;
+      std::shared_ptr<compliance::ComplianceSource> source;
       if (still[i]) {
-        source = compliance_of_factor(
-            [&organ] { return Factor(stiffness_matrix(organ.model), Context{}); });
+        source = compliance::compliance_of_factor(
+            [&organ] { return linalg::Factor(fem::stiffness_matrix(organ.model), Context{}); });
         if (i == scene.touched && variant.store != nullptr)
           source = variant.store->compliance();
       }
-      simulation_.add_object(organ.name, organ.model, still[i] ? Method::ffe : Method::ela,
-                             std::move(source));
+      simulation_.add_object(organ.name, organ.model,
+                             still[i] ? scene::Method::ffe : scene::Method::ela, std::move(source));
       if (!still[i]) { // what keeps it moving
         const std::size_t object = simulation_.object_count() - 1;
-        const double weight = 1e-3 * 9810 * total_mass(organ.model);
-        simulation_.apply(SetForce{object, {patch(organ.model).back()}, {0, 0, weight}, 0.8});
+        const double weight = 1e-3 * 9810 * model::total_mass(organ.model);
+        simulation_.apply(
+            scene::SetForce{object, {patch(organ.model).back()}, {0, 0, weight}, 0.8});
       }
     }
     if (!left_out[scene.touched]) {
@@ -272,11 +275,11 @@ public:
   double cycle(std::size_t contacts, const Cycle& kind) {
     return processor_milliseconds([&] {
       for (std::size_t k = 0; k < contacts; ++k) {
-        simulation_.apply(SetDisplacement{touched_, {nodes_[k]}, amplitude_ * any()});
+        simulation_.apply(scene::SetDisplacement{touched_, {nodes_[k]}, amplitude_ * any()});
       }
       simulation_.step(kind.duration);
       if (!kind.shapes) {
-        for (const NodeVector& force : simulation_.contact_forces(touched_))
+        for (const contact::NodeVector& force : simulation_.contact_forces(touched_))
           sum_ += force.value.x;
         return;
       }
@@ -286,7 +289,7 @@ public:
   }
 
 private:
-  Simulation simulation_;
+  scene::Simulation simulation_;
   /// No displacement is a sum of earlier ones.
   Vec3 any() {
     Vec3 v;
@@ -408,15 +411,15 @@ void with_contacts(const Scene& scene, const std::vector<Variant>& variants,
 double min_step(const Scene& scene) {
   double min = HUGE_VAL;
   for (const Organ& organ : scene.organs)
-    min = test::smaller(min, safe_step_fraction * safe_step(organ.model));
+    min = test::smaller(min, dynamics::safe_step_fraction * model::safe_step(organ.model));
   return min;
 }
 
 // ---- the same shape from both
 
-std::vector<double> shape_of(const BodyMotion& object) {
+std::vector<double> shape_of(const dynamics::BodyMotion& object) {
   std::vector<double> u;
-  for (const NodeMotion& m : object.motion())
+  for (const dynamics::NodeMotion& m : object.motion())
     for (int a = 0; a < 3; ++a)
       u.push_back(m.displacement[a]);
   return u;
@@ -434,9 +437,9 @@ double difference(std::span<const double> a, std::span<const double> b) {
 }
 
 /// A smooth pull of the m first nodes, of about `size` mm, one for each `wave`.
-Load pull(const Model& model, const std::vector<std::uint32_t>& nodes, std::size_t m, double size,
-          double wave = 0) {
-  Load load;
+contact::Load pull(const model::Model& model, const std::vector<std::uint32_t>& nodes,
+                   std::size_t m, double size, double wave = 0) {
+  contact::Load load;
   for (std::size_t k = 0; k < m; ++k) {
     const Vec3& at = model.nodes[nodes[k]].position;
     load.displacement[nodes[k]] =
@@ -447,7 +450,7 @@ Load pull(const Model& model, const std::vector<std::uint32_t>& nodes, std::size
 
 void equal_error(const Organ& organ, const Stored& store) {
   constexpr double near = 1e-3, part_of_edge = 1e-6, longest = 60; // s
-  const Model& model = organ.model;
+  const model::Model& model = organ.model;
   const std::vector<std::uint32_t> nodes = patch(model);
   const double size = part_of_edge * test::mean_edge(model);
   const std::string stage =
@@ -462,17 +465,17 @@ void equal_error(const Organ& organ, const Stored& store) {
   double min = HUGE_VAL;
   std::size_t min_at = 0;
   for (const std::size_t m : contacts) {
-    const Load load = pull(model, nodes, m, size);
+    const contact::Load load = pull(model, nodes, m, size);
     // The reference holds the nodes in the matrix.
-    Elastostatic exact(model, {}, one, {.block_limit = 0});
+    statics::Elastostatic exact(model, {}, one, {.block_limit = 0});
     exact.update(load);
     const std::vector<double> linear(exact.displacement().begin(), exact.displacement().end());
 
     std::vector<double> fresh, known;
-    std::vector<NodeVector> held;
+    std::vector<contact::NodeVector> held;
     double error = 0;
     for (int run = 0; run < 3; ++run) {
-      Elastostatic still(model, store.compliance(), one);
+      statics::Elastostatic still(model, store.compliance(), one);
       still.update({.gravity = {0, 0, -1}}); // so that the store's factor is at hand
       (void)still.displacement();
       std::vector<double> u;
@@ -497,8 +500,8 @@ void equal_error(const Organ& organ, const Stored& store) {
     if (!(error < near))
       throw Error("an elastostatic shape is wrong by " + std::to_string(error));
 
-    Elastodynamic moving(model);
-    const double h = safe_step_fraction * safe_step(model);
+    dynamics::Elastodynamic moving(model);
+    const double h = dynamics::safe_step_fraction * model::safe_step(model);
     std::vector<double> u;
     double spent = processor_milliseconds([&] {
       moving.set_load(load);
@@ -540,15 +543,15 @@ void equal_error(const Organ& organ, const Stored& store) {
 
 /// How far the linear shape is from the non-linear one, where implicit steps come to rest.
 void linearisation(const Organ& organ) {
-  const Model& model = organ.model;
+  const model::Model& model = organ.model;
   const std::vector<std::uint32_t> nodes = patch(model);
   const std::string stage = organ.name + "; 5 nodes pulled over pull in edges (log)";
   for (const double part : {1e-6, 1e-5, 1e-4, 1e-3, 1e-2, 1e-1}) {
-    const Load load = pull(model, nodes, 5, part * test::mean_edge(model));
-    Elastostatic still(model, {}, with_threads(1));
-    SolidChoice exact;
+    const contact::Load load = pull(model, nodes, 5, part * test::mean_edge(model));
+    statics::Elastostatic still(model, {}, with_threads(1));
+    integrator::SolidChoice exact;
     exact.tolerance = 1e-9;
-    SolidDynamic moving(model, exact, with_threads(1));
+    dynamics::SolidDynamic moving(model, exact, with_threads(1));
     std::vector<double> u;
     const double spent = processor_milliseconds([&] {
       moving.set_load(load, 0);
@@ -563,7 +566,7 @@ void linearisation(const Organ& organ) {
 }
 
 void figure_4_9(const Scene& scene, const std::vector<std::size_t>& contacts) {
-  const Model& touched = scene.organs[scene.touched].model;
+  const model::Model& touched = scene.organs[scene.touched].model;
   std::vector<std::uint32_t> nodes = patch(touched);
   nodes.resize(std::min(nodes.size(), max_contacts));
   const Stored wide(touched, nodes, Stored::Kept::float64),

@@ -18,8 +18,8 @@ inline double operations(double columns, double below) {
 }
 
 /// Of the whole factor.
-inline double all_operations(const Factor& factor) {
-  const FactorView l = factor.view();
+inline double all_operations(const linalg::Factor& factor) {
+  const linalg::FactorView l = factor.view();
   double all = 0;
   for (std::size_t f = 0; f + 1 < l.super.size(); ++f) {
     const auto columns = static_cast<double>(l.super[f + 1] - l.super[f]);
@@ -32,7 +32,7 @@ inline double all_operations(const Factor& factor) {
 class CholmodPeer {
 public:
   /// \param best its order by AMD and by METIS, whichever fills less; else as it would choose
-  explicit CholmodPeer(const StiffnessMatrix& matrix, bool best = false) {
+  explicit CholmodPeer(const linalg::StiffnessMatrix& matrix, bool best = false) {
     (void)cholmod_l_start(&common_);
     common_.print = 0;
     common_.supernodal = CHOLMOD_SUPERNODAL;

@@ -39,28 +39,28 @@ using namespace gewebe::timing;
 namespace {
 
 struct Solid {
-  TetMesh mesh;
+  tetrahedra::TetMesh mesh;
   std::vector<std::uint32_t> surface;
-  StiffnessMatrix matrix;
-  std::unique_ptr<Factor> factor;
+  linalg::StiffnessMatrix matrix;
+  std::unique_ptr<linalg::Factor> factor;
   double norm = 0;
 };
 
-TetMesh ball(double cell) {
-  GridInfo info;
-  info.transform = uniform_transform(cell);
+tetrahedra::TetMesh ball(double cell) {
+  volume::GridInfo info;
+  info.transform = volume::uniform_transform(cell);
   info.level_set = true;
   info.background = 9;
   const int reach = static_cast<int>(std::ceil(5 / cell)) + 3;
-  return stuff({},
-               scenes::sample(info, {-reach, -reach, -reach}, {reach, reach, reach},
-                              [&](int i, int j, int k) {
-                                return norm(Vec3{i * cell, j * cell, k * cell}) - 5;
-                              }),
-               {});
+  return stuffing::stuff({},
+                         scenes::sample(info, {-reach, -reach, -reach}, {reach, reach, reach},
+                                        [&](int i, int j, int k) {
+                                          return norm(Vec3{i * cell, j * cell, k * cell}) - 5;
+                                        }),
+                         {});
 }
 
-Solid solid_of(TetMesh mesh) {
+Solid solid_of(tetrahedra::TetMesh mesh) {
   Solid solid;
   solid.mesh = std::move(mesh);
   const std::vector<Vec3>& points = solid.mesh.points;
@@ -70,17 +70,17 @@ Solid solid_of(TetMesh mesh) {
   std::vector<std::uint8_t> fixed(3 * points.size());
   for (std::size_t axis = 0; axis < fixed.size(); ++axis)
     fixed[axis] = points[axis / 3].x < box.min.x + 0.1 * box.size().x;
-  const std::vector<SolidMaterial> material{{5000, 0.45, 1e-3}};
-  solid.matrix = solid_stiffness(solid.mesh, solid_elements(solid.mesh, material), fixed);
-  solid.factor = std::make_unique<Factor>(solid.matrix, Context{});
-  solid.norm = stiffness_norm(solid.matrix);
-  solid.surface.resize(boundary(solid.mesh).mesh.points.size());
+  const std::vector<fem::SolidMaterial> material{{5000, 0.45, 1e-3}};
+  solid.matrix = fem::solid_stiffness(solid.mesh, fem::solid_elements(solid.mesh, material), fixed);
+  solid.factor = std::make_unique<linalg::Factor>(solid.matrix, Context{});
+  solid.norm = linalg::stiffness_norm(solid.matrix);
+  solid.surface.resize(tetrahedra::boundary(solid.mesh).mesh.points.size());
   std::iota(solid.surface.begin(), solid.surface.end(), 0U); // they come first
   return solid;
 }
 
 /// Keeps columns of a few nodes as float32, and as they are.
-class Patch final : public ColumnSource, public ColumnSink {
+class Patch final : public columns::ColumnSource, public columns::ColumnSink {
 public:
   Patch(std::size_t rows, std::vector<std::uint32_t> nodes)
       : rows_(rows), nodes_(std::move(nodes)) {}
@@ -119,10 +119,12 @@ void bench(const Solid& solid, bool all_rows, std::initializer_list<double> boun
   const std::size_t n = solid.mesh.points.size(), rows = all_rows ? n : solid.surface.size();
   const auto points = std::span(solid.mesh.points).first(rows);
   double solving = 0;
-  const ColumnMaker maker = [&](std::span<const std::uint32_t> nodes, ColumnSink& sink) {
+  const columns::ColumnMaker maker = [&](std::span<const std::uint32_t> nodes,
+                                         columns::ColumnSink& sink) {
     double residual = 0;
     solving += milliseconds([&] {
-      residual = compliance_columns(solid.matrix, *solid.factor, solid.norm, nodes, {}, sink, rows);
+      residual = columns::compliance_columns(solid.matrix, *solid.factor, solid.norm, nodes, {},
+                                             sink, rows);
     });
     return residual;
   };
@@ -130,18 +132,18 @@ void bench(const Solid& solid, bool all_rows, std::initializer_list<double> boun
   const std::vector<std::uint32_t> largest = patch_of(solid, 300);
   Patch plain(rows, largest);
   (void)maker(largest, plain);
-  ColumnCache cache(rows, &plain, {}, 4e9, false);
+  columns::ColumnCache cache(rows, &plain, {}, 4e9, false);
   cache.need(largest);
   for (const double relative : bounds) {
     solving = 0;
-    CompressedMade made;
-    const double all =
-        milliseconds([&] { made = compress_columns(points, solid.surface, relative, maker, {}); });
+    columns::CompressedMade made;
+    const double all = milliseconds(
+        [&] { made = columns::compress_columns(points, solid.surface, relative, maker, {}); });
     double bytes = 0;
     for (const auto& chunk : made.chunks)
       bytes += static_cast<double>(chunk.size());
     const double bound = made.layout.bound;
-    const auto columns = compressed_columns(std::move(made), n);
+    const auto columns = columns::compressed_columns(std::move(made), n);
     double worst = 0;
     std::vector<double> exact(9 * rows), read(9 * rows);
     for (std::size_t k = 0; k < 24; ++k) {
@@ -157,7 +159,7 @@ void bench(const Solid& solid, bool all_rows, std::initializer_list<double> boun
     std::printf("%zu,%zu,%g,%.1f,%.1f,%.4f,%.3f,%.1f,%.1f", n, rows, relative, single, bytes * 1e-6,
                 bytes * 1e-6 / single, worst / bound, solving * 1e-3, (all - solving) * 1e-3);
     for (const std::size_t count : patches) {
-      std::vector<NodeVector> forces;
+      std::vector<contact::NodeVector> forces;
       for (const std::uint32_t node : patch_of(solid, count))
         forces.push_back({node, {1, 2, 3}});
       std::vector<double> u(3 * rows);
@@ -198,8 +200,8 @@ int main(int argc, char** argv) {
   }
   for (const std::string& name : meshes)
     at(name, [&] {
-      Input input(name);
-      bench(solid_of(read_tet_mesh(input, {})), all_rows, {1e-3, 1e-4, 1e-5});
+      formats::Input input(name);
+      bench(solid_of(formats::read_tet_mesh(input, {})), all_rows, {1e-3, 1e-4, 1e-5});
     });
   for (std::size_t k = 0; meshes.empty() && k < cells.size(); ++k)
     bench(solid_of(ball(cells[k])), all_rows, {1e-3, 1e-4, 1e-5});

@@ -40,16 +40,17 @@ void report(const char* stage, const std::string& program, std::size_t nodes, st
 }
 
 struct Organ {
-  Model model;
-  StiffnessMatrix matrix;
-  FactorData factor;
+  model::Model model;
+  linalg::StiffnessMatrix matrix;
+  linalg::FactorData factor;
   std::vector<std::uint32_t> patch; ///< ascending
 };
 
 /// The surface nodes nearest to one.
-std::vector<std::uint32_t> patch_of(const Model& model, std::uint32_t centre, std::size_t count) {
+std::vector<std::uint32_t> patch_of(const model::Model& model, std::uint32_t centre,
+                                    std::size_t count) {
   std::vector<std::pair<double, std::uint32_t>> order;
-  for (std::uint32_t i = 0; i < surface_count(model); ++i) {
+  for (std::uint32_t i = 0; i < model::surface_count(model); ++i) {
     const Vec3 d = model.nodes[i].position - model.nodes[centre].position;
     order.emplace_back(dot(d, d), i);
   }
@@ -68,12 +69,13 @@ struct Way {
   int threads = 2;
 };
 
-std::shared_ptr<ComplianceSource> compliance_of(const Organ& organ, bool single) {
-  return compliance_of_store(memory_stiffness(organ.matrix, organ.factor, organ.patch, single));
+std::shared_ptr<compliance::ComplianceSource> compliance_of(const Organ& organ, bool single) {
+  return compliance::compliance_of_store(
+      memory_stiffness(organ.matrix, organ.factor, organ.patch, single));
 }
 
 /// Every displacement changes with every update, as of a surface that is pressed in.
-void move_all(Load& load, std::mt19937& random) {
+void move_all(contact::Load& load, std::mt19937& random) {
   std::normal_distribution<double> normal;
   const Vec3 push{normal(random), normal(random), normal(random)};
   for (auto& [node, d] : load.displacement)
@@ -87,10 +89,10 @@ double quantile(std::vector<double> times, double q) {
 
 void bench_contact(const Organ& organ, std::size_t contacts, const Way& way) {
   const std::size_t n = organ.model.nodes.size();
-  Elastostatic object(organ.model, compliance_of(organ, way.single), with_threads(way.threads),
-                      {.tolerance = way.tolerance});
-  Elastostatic exact(organ.model, compliance_of(organ, false), with_threads(2));
-  Load load;
+  statics::Elastostatic object(organ.model, compliance_of(organ, way.single),
+                               with_threads(way.threads), {.tolerance = way.tolerance});
+  statics::Elastostatic exact(organ.model, compliance_of(organ, false), with_threads(2));
+  contact::Load load;
   for (std::size_t k = 0; k < contacts; ++k)
     load.displacement[organ.patch[k * organ.patch.size() / contacts]] = {};
   std::mt19937 random(1);
@@ -131,7 +133,7 @@ void bench_contact(const Organ& organ, std::size_t contacts, const Way& way) {
          quantile(shapes, 0.99), "ms p99");
   report("error of shape", way.name, n, contacts, way.threads, times_of(shapes), worst,
          "of the largest displacement");
-  const ElastostaticCounts counts = object.counts();
+  const statics::ElastostaticCounts counts = object.counts();
   report("left out", way.name, n, contacts, way.threads, times_of(shapes),
          static_cast<double>(counts.skipped - skipped) /
              std::max(1.0, static_cast<double>(counts.terms - terms + counts.skipped - skipped)),
@@ -140,8 +142,8 @@ void bench_contact(const Organ& organ, std::size_t contacts, const Way& way) {
 
 /// The whole patch, turned and shifted as one.
 void bench_grasp(const Organ& organ) {
-  Elastostatic object(organ.model, compliance_of(organ, false), with_threads(2));
-  Load load;
+  statics::Elastostatic object(organ.model, compliance_of(organ, false), with_threads(2));
+  contact::Load load;
   int frame = 0;
   const auto pose = [&] {
     const double turn = 0.01 * std::sin(0.3 * ++frame), c = std::cos(turn), s = std::sin(turn);
@@ -162,8 +164,8 @@ void bench_grasp(const Organ& organ) {
 
 /// One node joins, one leaves, as where an instrument slides.
 void bench_sliding(const Organ& organ, std::size_t contacts) {
-  Elastostatic object(organ.model, compliance_of(organ, false), with_threads(2));
-  Load load;
+  statics::Elastostatic object(organ.model, compliance_of(organ, false), with_threads(2));
+  contact::Load load;
   for (std::size_t k = 0; k < contacts; ++k)
     load.displacement[organ.patch[k]] = {};
   std::mt19937 random(1);
@@ -225,8 +227,8 @@ void bench_streaming(const Organ& organ, const char* name) {
         kept |= part;
       sums.push_back(milliseconds([&] {
         parallel_blocks(with_threads(threads), axes, 3072, [&](std::size_t begin, std::size_t end) {
-          column_sum<Entry>(best_cpu_level())(columns.data(), factor.data(), count, sum.data(),
-                                              begin, end);
+          columns::column_sum<Entry>(best_cpu_level())(columns.data(), factor.data(), count,
+                                                       sum.data(), begin, end);
         });
       }));
     }
@@ -243,7 +245,7 @@ void bench_streaming(const Organ& organ, const char* name) {
 }
 
 void bench_solve(const Organ& organ) {
-  const Factor factor(organ.factor);
+  const linalg::Factor factor(organ.factor);
   std::vector<double> f(factor.order(), 1), u(factor.order());
   const Times times = measure([&] { factor.solve(f, u); }, 51);
   report("solve", "factor", organ.model.nodes.size(), 1, 1, times,
@@ -259,9 +261,9 @@ int main() {
     (void)std::fputs("contact: no shared data, a ball instead\n", stderr);
     mesh = test::sphere_mesh(5, 100, {});
   }
-  Organ organ{build_model(mesh, {}, Context{}).model, {}, {}, {}};
-  organ.matrix = stiffness_matrix(organ.model);
-  organ.factor = Factor(organ.matrix, Context{}).data();
+  Organ organ{model::build_model(mesh, {}, Context{}).model, {}, {}, {}};
+  organ.matrix = fem::stiffness_matrix(organ.model);
+  organ.factor = linalg::Factor(organ.matrix, Context{}).data();
   organ.patch = patch_of(organ.model, 1000, 200);
   bench_streaming<double>(organ, "float64");
   bench_streaming<float>(organ, "float32");

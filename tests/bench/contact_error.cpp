@@ -62,24 +62,24 @@ std::pair<double, double> force_of_theory() {
   return {force, a};
 }
 
-Model block_of(const std::vector<double>& x, const std::vector<double>& y,
-               const std::vector<double>& z, bool quadratic) {
+model::Model block_of(const std::vector<double>& x, const std::vector<double>& y,
+                      const std::vector<double>& z, bool quadratic) {
   const auto count = [](const std::vector<double>& at) {
     return static_cast<std::uint32_t>(at.size() - 1);
   };
-  TetMesh mesh = test::box_tetrahedra(count(x), count(y), count(z));
+  tetrahedra::TetMesh mesh = test::box_tetrahedra(count(x), count(y), count(z));
   for (Vec3& p : mesh.points)
     p = {x[static_cast<std::size_t>(p.x)], y[static_cast<std::size_t>(p.y)],
          z[static_cast<std::size_t>(p.z)]};
-  SolidModelOptions options;
+  fem::SolidModelOptions options;
   options.material.materials[0].young = young;
   options.material.materials[0].poisson = poisson;
   options.quadratic = quadratic;
-  return solid_model(std::move(mesh), options, with_threads(1));
+  return fem::solid_model(std::move(mesh), options, with_threads(1));
 }
 
 /// Cells of even width to beyond the touched circle, then wider and wider.
-Model quarter(double touched) {
+model::Model quarter(double touched) {
   std::vector<double> at{0};
   const double cell = touched / 5;
   while (at.back() < 1.2 * touched)
@@ -89,12 +89,12 @@ Model quarter(double touched) {
   std::vector<double> down;
   for (auto z = at.rbegin(); z != at.rend(); ++z)
     down.push_back(-*z);
-  Model model = block_of(at, at, down, true);
-  for (Node& node : model.nodes) {
+  model::Model model = block_of(at, at, down, true);
+  for (model::Node& node : model.nodes) {
     const auto& [x, y, z] = node.position;
     const bool far = x == at.back() || y == at.back() || z == down.front();
-    node.fixed = static_cast<std::uint8_t>(far ? fixed_all
-                                               : (x == 0 ? fixed_x : 0) | (y == 0 ? fixed_y : 0));
+    node.fixed = static_cast<std::uint8_t>(
+        far ? model::fixed_all : (x == 0 ? model::fixed_x : 0) | (y == 0 ? model::fixed_y : 0));
   }
   return model;
 }
@@ -106,17 +106,17 @@ std::vector<double> even(double from, double to, int cells) {
   return at;
 }
 
-Model small_block() {
+model::Model small_block() {
   const std::vector<double> across = even(-5, 5, 16);
-  Model model = block_of(across, across, even(-4, 0, 6), false);
-  for (Node& node : model.nodes)
-    node.fixed = node.position.z == -4 ? fixed_all : fixed_none;
+  model::Model model = block_of(across, across, even(-4, 0, 6), false);
+  for (model::Node& node : model.nodes)
+    node.fixed = node.position.z == -4 ? model::fixed_all : model::fixed_none;
   return model;
 }
 
 struct Scene {
   std::string name;
-  Model model;
+  model::Model model;
   std::vector<Vec3> way; ///< of the sphere's centre
   std::size_t counted;   ///< from this part of the way on forces count
   double friction = 0;
@@ -128,7 +128,8 @@ struct Answer {
   double milliseconds = 0;
 };
 
-Answer answer(const Scene& scene, Elastostatic& solver, const contact::Parameters& parameters) {
+Answer answer(const Scene& scene, statics::Elastostatic& solver,
+              const contact::Parameters& parameters) {
   Answer result;
   validate::PressedBody body(scene.model, solver, {radius, {}, scene.friction},
                              {{scene.way[0].x, 0, radius + 0.02}, {}}, parameters);
@@ -178,7 +179,7 @@ void row(const Scene& scene, const std::string& program, std::size_t contacts, d
 }
 
 void bench(const Scene& scene, double theory) {
-  Elastostatic solver(scene.model, nullptr, with_threads(1));
+  statics::Elastostatic solver(scene.model, nullptr, with_threads(1));
   contact::Parameters tight;
   set_gap(tight, 1e-3);
   set_tolerance(tight, 0.1);
@@ -244,9 +245,9 @@ void bench_peer(const Scene& scene) {
   std::vector<double> places;
   std::vector<std::uint64_t> corners, held;
   for (std::size_t n = 0; n < scene.model.nodes.size(); ++n) {
-    const Node& node = scene.model.nodes[n];
+    const model::Node& node = scene.model.nodes[n];
     places.insert(places.end(), {node.position.x, node.position.y, node.position.z});
-    if (node.fixed == fixed_all)
+    if (node.fixed == model::fixed_all)
       held.push_back(n);
   }
   for (const Tetrahedron& t : scene.model.tetrahedra)

@@ -52,15 +52,15 @@ void report(const char* operation, const char* program, std::size_t large, std::
 }
 
 /// A ball of 0 and 1 with an edge of a few voxels between: leaves near its surface, tiles inside.
-Grid ball(const Vec3& center, double radius) {
-  const Grid scan =
-      voxelize({}, sphere_mesh(6, radius, center), uniform_transform(1), {.samples = 1});
-  GridBuilder builder(scan.info());
+volume::Grid ball(const Vec3& center, double radius) {
+  const volume::Grid scan = voxelization::voxelize({}, sphere_mesh(6, radius, center),
+                                                   volume::uniform_transform(1), {.samples = 1});
+  volume::GridBuilder builder(scan.info());
   std::vector<Int3> origins;
-  for (const LeafView& leaf : scan.leaves())
+  for (const volume::LeafView& leaf : scan.leaves())
     origins.push_back(leaf.origin);
-  for (const LeafRef& leaf : builder.add_leaves({}, origins))
-    for (int n = 0; n < leaf_voxels; ++n) {
+  for (const volume::LeafRef& leaf : builder.add_leaves({}, origins))
+    for (int n = 0; n < volume::leaf_voxels; ++n) {
       const Vec3 voxel{1.0 * (leaf.origin[0] + (n >> 6)), 1.0 * (leaf.origin[1] + (n >> 3 & 7)),
                        1.0 * (leaf.origin[2] + (n & 7))};
       const double density = 0.5 + 0.2 * (radius - norm(voxel - center));
@@ -68,37 +68,37 @@ Grid ball(const Vec3& center, double radius) {
       if (leaf.values[n] != 0)
         leaf.active[n / 64] |= std::uint64_t{1} << (n % 64);
     }
-  for (const TileView& tile : scan.tiles())
+  for (const volume::TileView& tile : scan.tiles())
     builder.add_tile(tile);
   return builder.finish();
 }
 
 /// With leaves and tiles of its own.
-Grid copy_of(const Grid& grid) {
-  GridBuilder builder(grid.info());
-  const std::vector<LeafView> leaves = grid.leaves();
+volume::Grid copy_of(const volume::Grid& grid) {
+  volume::GridBuilder builder(grid.info());
+  const std::vector<volume::LeafView> leaves = grid.leaves();
   std::vector<Int3> origins;
-  for (const LeafView& leaf : leaves)
+  for (const volume::LeafView& leaf : leaves)
     origins.push_back(leaf.origin);
-  const std::vector<LeafRef> refs = builder.add_leaves({}, origins);
+  const std::vector<volume::LeafRef> refs = builder.add_leaves({}, origins);
   for (std::size_t n = 0; n < leaves.size(); ++n) {
-    std::copy_n(leaves[n].values, leaf_voxels, refs[n].values);
+    std::copy_n(leaves[n].values, volume::leaf_voxels, refs[n].values);
     std::copy_n(leaves[n].active, 8, refs[n].active);
   }
-  for (const TileView& tile : grid.tiles())
+  for (const volume::TileView& tile : grid.tiles())
     builder.add_tile(tile);
-  Grid copy = builder.finish(false);
+  volume::Grid copy = builder.finish(false);
   (void)copy.summary({}); // as after reading
   return copy;
 }
 
-std::uint64_t differences(const Grid& ours, const FloatTree& theirs) {
+std::uint64_t differences(const volume::Grid& ours, const volume::FloatTree& theirs) {
   std::uint64_t count = 0;
-  for (const LeafView& leaf : ours.leaves()) {
-    const FloatLeaf* const other = theirs.probeConstLeaf(to_coord(leaf.origin));
-    for (int n = 0; n < leaf_voxels; ++n) {
-      const float value =
-          other != nullptr ? other->buffer().data()[n] : theirs.getValue(to_coord(leaf.origin));
+  for (const volume::LeafView& leaf : ours.leaves()) {
+    const volume::FloatLeaf* const other = theirs.probeConstLeaf(volume::to_coord(leaf.origin));
+    for (int n = 0; n < volume::leaf_voxels; ++n) {
+      const float value = other != nullptr ? other->buffer().data()[n]
+                                           : theirs.getValue(volume::to_coord(leaf.origin));
       count += !(value == leaf.values[n]);
     }
   }
@@ -107,33 +107,33 @@ std::uint64_t differences(const Grid& ours, const FloatTree& theirs) {
 
 using Tool = std::function<void(openvdb::FloatGrid&, openvdb::FloatGrid&)>;
 
-void bench(const char* name, CsgOperation operation, const Tool& tool, const Grid& large,
-           const Grid& small) {
+void bench(const char* name, volume::CsgOperation operation, const Tool& tool,
+           const volume::Grid& large, const volume::Grid& small) {
   const std::size_t leaves = large.leaves().size(), others = small.leaves().size();
-  Grid ours;
+  volume::Grid ours;
   for (const int threads : {1, 2}) {
     Context context;
     context.threads = threads;
-    const auto combine = [&](std::vector<CsgOperand> operands) {
-      return csg(context, operation, std::move(operands));
+    const auto combine = [&](std::vector<volume::CsgOperand> operands) {
+      return volume::csg(context, operation, std::move(operands));
     };
     const Times moved = measure(
         [&] {
-          std::vector<CsgOperand> operands;
+          std::vector<volume::CsgOperand> operands;
           operands.push_back({copy_of(large), ""});
           operands.push_back({copy_of(small), ""});
           return operands;
         },
         combine);
     report(name, "gewebe", leaves, others, threads, moved, 0);
-    const auto share = [&] { return std::vector<CsgOperand>{{large, ""}, {small, ""}}; };
+    const auto share = [&] { return std::vector<volume::CsgOperand>{{large, ""}, {small, ""}}; };
     report(name, "gewebe_shared", leaves, others, threads, measure(share, combine), 0);
     ours = combine(share());
   }
   std::pair<openvdb::FloatGrid::Ptr, openvdb::FloatGrid::Ptr> theirs; // freed between the runs
   const auto copies = [&] {
-    const auto copy = [](const Grid& grid) {
-      return openvdb::FloatGrid::create(std::make_shared<FloatTree>(*grid.native()->tree));
+    const auto copy = [](const volume::Grid& grid) {
+      return openvdb::FloatGrid::create(std::make_shared<volume::FloatTree>(*grid.native()->tree));
     };
     return std::pair(copy(large), copy(small));
   };
@@ -163,15 +163,15 @@ void bench(const char* name, CsgOperation operation, const Tool& tool, const Gri
 int main() {
   std::puts("operation,program,large_leaves,small_leaves,threads,median_ms,fastest_ms,slowest_ms,"
             "differences");
-  const Grid large = copy_of(ball({0, 0, 0}, 500)); // 1000³ voxels
+  const volume::Grid large = copy_of(ball({0, 0, 0}, 500)); // 1000³ voxels
   for (const double radius : {4.0, 16.0, 64.0, 256.0}) {
-    const Grid small = copy_of(ball({500, 0, 0}, radius));
+    const volume::Grid small = copy_of(ball({500, 0, 0}, radius));
     bench(
-        "add", CsgOperation::add,
+        "add", volume::CsgOperation::add,
         [](openvdb::FloatGrid& a, openvdb::FloatGrid& b) { openvdb::tools::compSum(a, b); }, large,
         small);
     bench(
-        "union", CsgOperation::unite, // csgUnion is for level sets
+        "union", volume::CsgOperation::unite, // csgUnion is for level sets
         [](openvdb::FloatGrid& a, openvdb::FloatGrid& b) { openvdb::tools::compMax(a, b); }, large,
         small);
   }

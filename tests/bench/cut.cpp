@@ -58,7 +58,7 @@ void print(const char* stage, const std::string& program, std::size_t springs, s
 /// CHOLMOD's simplicial L D L' of a matrix, which rank-k updates change.
 class Updated {
 public:
-  explicit Updated(const StiffnessMatrix& matrix) : matrix_(matrix) {
+  explicit Updated(const linalg::StiffnessMatrix& matrix) : matrix_(matrix) {
     (void)cholmod_l_start(&common_);
     common_.print = 0;
     common_.supernodal = CHOLMOD_SUPERNODAL;
@@ -85,7 +85,7 @@ public:
   Updated& operator=(const Updated&) = delete;
 
   /// Adds (or takes away) springs of rest length. \return ms
-  double update(bool add, const Model& model, std::span<const std::size_t> springs) {
+  double update(bool add, const model::Model& model, std::span<const std::size_t> springs) {
     cholmod_sparse* const c = columns(model, springs);
     const double time =
         milliseconds([&] { (void)cholmod_l_updown(add ? 1 : 0, c, factor_, &common_); });
@@ -107,7 +107,7 @@ public:
   }
 
 private:
-  cholmod_sparse* columns(const Model& model, std::span<const std::size_t> springs) {
+  cholmod_sparse* columns(const model::Model& model, std::span<const std::size_t> springs) {
     cholmod_triplet* t = cholmod_l_allocate_triplet(matrix_.order(), springs.size(),
                                                     6 * springs.size(), 0, CHOLMOD_REAL, &common_);
     const auto* const permutation = static_cast<const std::int64_t*>(factor_->Perm);
@@ -117,7 +117,7 @@ private:
         place_[static_cast<std::size_t>(permutation[k])] = static_cast<std::int64_t>(k);
     }
     for (std::size_t c = 0; c < springs.size(); ++c) {
-      const Spring& s = model.springs[springs[c]];
+      const model::Spring& s = model.springs[springs[c]];
       const Vec3 d = model.nodes[s.j].position - model.nodes[s.i].position;
       const Vec3 n = std::sqrt(s.stiffness) * d / norm(d);
       for (const bool first : {true, false})
@@ -136,13 +136,13 @@ private:
     return columns;
   }
 
-  const StiffnessMatrix& matrix_;
+  const linalg::StiffnessMatrix& matrix_;
   cholmod_common common_{};
   cholmod_factor* factor_ = nullptr;
   std::vector<std::int64_t> place_;
 };
 
-AxesSolve solver_of(const FrontalFactor& factor) {
+update::AxesSolve solver_of(const linalg::FrontalFactor& factor) {
   return [&factor](std::span<double> f, std::size_t columns) { factor.solve(f, columns); };
 }
 
@@ -155,20 +155,20 @@ std::vector<double> load(std::size_t axes) {
 }
 
 /// Springs alone: nodes stay, so that CHOLMOD's update can follow.
-void bench_springs(const Model& model, int threads) {
+void bench_springs(const model::Model& model, int threads) {
   const Context context = with_threads(threads);
-  const StiffnessMatrix matrix = stiffness_matrix(model);
-  FrontalFactor factor(model, context);
-  Factor cholmod(matrix, context);
+  const linalg::StiffnessMatrix matrix = fem::stiffness_matrix(model);
+  linalg::FrontalFactor factor(model, context);
+  linalg::Factor cholmod(matrix, context);
   Updated updated(matrix);
   const std::vector<double> f = load(3 * model.nodes.size());
   std::mt19937 random(1);
   for (const std::size_t count : std::array<std::size_t, 9>{1, 2, 5, 10, 20, 24, 50, 100, 200}) {
     std::map<std::string, Row> rows;
     for (int round = 0; round < (count > 24 ? 20 : 60); ++round) {
-      const Cut cut = test::springs_around(
-          model, static_cast<std::uint32_t>(random() % surface_count(model)), count);
-      Model now = model;
+      const cutting::Cut cut = test::springs_around(
+          model, static_cast<std::uint32_t>(random() % model::surface_count(model)), count);
+      model::Model now = model;
       for (const std::size_t e : cut.springs)
         now.springs[e].stiffness *= 1e-6; // so that nothing hangs loose, whatever is cut
       const auto same = [&] {
@@ -183,13 +183,16 @@ void bench_springs(const Model& model, int threads) {
           row.error = test::larger(row.error, test::relative_difference(u, expected));
       };
       if (count <= 100) {
-        std::optional<WoodburySolver> corrected;
+        std::optional<update::WoodburySolver> corrected;
         rows["Woodbury"].times.push_back(milliseconds([&] {
-          corrected.emplace(stiffness_change(model, now, same, same), solver_of(factor), context);
+          corrected.emplace(update::stiffness_change(model, now, same, same), solver_of(factor),
+                            context);
         }));
         if (round % 10 == 0) {
           expected = f;
-          AxisSolver{Factor(stiffness_matrix(now), context), matrix.row_of_axis}.solve(expected);
+          compliance::AxisSolver{linalg::Factor(fem::stiffness_matrix(now), context),
+                                 matrix.row_of_axis}
+              .solve(expected);
         }
         u = f;
         corrected->solve(u);
@@ -198,10 +201,12 @@ void bench_springs(const Model& model, int threads) {
       if (count <= 100) {
         if (expected.empty() && round % 10 == 0) {
           expected = f;
-          AxisSolver{Factor(stiffness_matrix(now), context), matrix.row_of_axis}.solve(expected);
+          compliance::AxisSolver{linalg::Factor(fem::stiffness_matrix(now), context),
+                                 matrix.row_of_axis}
+              .solve(expected);
         }
         // Removing all but a millionth, as the model does.
-        Model gone = model;
+        model::Model gone = model;
         for (const std::size_t e : cut.springs)
           gone.springs[e].stiffness *= 1 - 1e-6;
         Row& row = rows["CHOLMOD update"];
@@ -215,21 +220,23 @@ void bench_springs(const Model& model, int threads) {
           milliseconds([&] { (void)factor.refactor(now, {}, {}, context); }));
       if (round % 10 == 0) {
         expected = f;
-        AxisSolver{Factor(stiffness_matrix(now), context), matrix.row_of_axis}.solve(expected);
+        compliance::AxisSolver{linalg::Factor(fem::stiffness_matrix(now), context),
+                               matrix.row_of_axis}
+            .solve(expected);
         u = f;
         factor.solve(u);
         judge(rows["refactorisation"]);
       }
       (void)factor.refactor(model, {}, {}, context);
       if (round % 5 == 0) {
-        Model all = model;
-        for (Spring& s : all.springs)
+        model::Model all = model;
+        for (model::Spring& s : all.springs)
           s.stiffness *= 1.5;
         rows["all fronts"].times.push_back(
             milliseconds([&] { (void)factor.refactor(all, {}, {}, context); }));
         (void)factor.refactor(model, {}, {}, context);
         rows["CHOLMOD factor"].times.push_back(
-            milliseconds([&] { cholmod.refactor(stiffness_matrix(now), context); }));
+            milliseconds([&] { cholmod.refactor(fem::stiffness_matrix(now), context); }));
       }
     }
     for (auto& [program, row] : rows)
@@ -238,36 +245,36 @@ void bench_springs(const Model& model, int threads) {
 }
 
 /// The surface opened: nodes are doubled. The whole cut, from the area of the blade on.
-void bench_opening(const Model& first, int threads) {
+void bench_opening(const model::Model& first, int threads) {
   const Context context = with_threads(threads);
   std::mt19937 random(2);
   const double edge = test::mean_edge(first);
   for (const double length : {2.0, 4.0, 8.0, 16.0}) {
-    auto model = std::make_shared<const Model>(first);
-    CutStiffness stiffness(model, nullptr, context);
+    auto model = std::make_shared<const model::Model>(first);
+    update::CutStiffness stiffness(model, nullptr, context);
     stiffness.prepare();
     std::map<std::string, Row> rows;
     double touched = 0;
     int cuts = 0;
     for (int round = 0; round < 60; ++round) {
-      const SweptQuad area =
+      const cutting::SweptQuad area =
           test::blade_at(*model, random() % model->triangles.size(),
                          static_cast<double>(random() % 628) / 100, length * edge, edge);
-      std::optional<CutModel> next;
+      std::optional<cutting::CutModel> next;
       const double find = milliseconds([&] {
-        const Cut cut = swept_cut(*model, {}, std::span(&area, 1));
+        const cutting::Cut cut = cutting::swept_cut(*model, {}, std::span(&area, 1));
         if (!cut.empty())
-          next.emplace(cut_model(*model, cut));
+          next.emplace(cutting::cut_model(*model, cut));
       });
-      if (!next || !next->changed() || !free_parts(*model, *next).parts.empty())
+      if (!next || !next->changed() || !cutting::free_parts(*model, *next).parts.empty())
         continue;
-      auto now = std::make_shared<const Model>(std::move(next->model));
-      CutWork work;
+      auto now = std::make_shared<const model::Model>(std::move(next->model));
+      update::CutWork work;
       double follow = 0;
       try {
         follow = milliseconds([&] { work = stiffness.cut(now, next->origin, next->place); });
       } catch (const Error&) { // hangs at too little
-        stiffness = CutStiffness(model, nullptr, context);
+        stiffness = update::CutStiffness(model, nullptr, context);
         stiffness.prepare();
         continue;
       }
@@ -277,11 +284,11 @@ void bench_opening(const Model& first, int threads) {
       rows["its stiffness"].times.push_back(follow);
       rows["both"].times.push_back(find + follow);
       if (round % 6 == 0) {
-        std::optional<AxisSolver> fresh;
+        std::optional<compliance::AxisSolver> fresh;
         rows["CHOLMOD afresh"].times.push_back(milliseconds([&] {
-          StiffnessMatrix matrix = stiffness_matrix(*now);
-          Factor factor(matrix, context);
-          fresh.emplace(AxisSolver{std::move(factor), std::move(matrix.row_of_axis)});
+          linalg::StiffnessMatrix matrix = fem::stiffness_matrix(*now);
+          linalg::Factor factor(matrix, context);
+          fresh.emplace(compliance::AxisSolver{std::move(factor), std::move(matrix.row_of_axis)});
         }));
         std::vector<double> u = load(3 * now->nodes.size()), expected = u;
         stiffness.compliance()->solve(u, 1);
@@ -306,7 +313,7 @@ int main() {
     (void)std::fputs("cut: no shared data, a ball instead\n", stderr);
     mesh = test::sphere_mesh(5, 100, {});
   }
-  const Model model = build_model(mesh, {}, Context{}).model;
+  const model::Model model = model::build_model(mesh, {}, Context{}).model;
   for (const int threads : {1, 2}) {
     bench_springs(model, threads);
     bench_opening(model, threads);

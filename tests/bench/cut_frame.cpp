@@ -55,7 +55,7 @@ std::string numbers(std::initializer_list<double> values) {
 
 struct Scene {
   std::string tools, folder;
-  Model model;
+  model::Model model;
   const char* name = "";
   std::vector<std::uint32_t> free;                    // nodes of the surface that can move
   std::vector<std::vector<std::uint32_t>> neighbours; // by node, along edges
@@ -194,22 +194,22 @@ void bench(const Scene& scene, const Kind& kind, double size, std::size_t contac
 }
 
 void bench_model(Scene& scene, const TriangleMesh& mesh, bool bend) {
-  BuildOptions options;
+  model::BuildOptions options;
   options.bend = bend;
-  scene.model = build_model(mesh, options, Context{}).model;
+  scene.model = model::build_model(mesh, options, Context{}).model;
   scene.free.clear();
   scene.neighbours.assign(scene.model.nodes.size(), {});
-  for (std::uint32_t i = 0; i < surface_count(scene.model); ++i)
-    if (scene.model.nodes[i].fixed == fixed_none)
+  for (std::uint32_t i = 0; i < model::surface_count(scene.model); ++i)
+    if (scene.model.nodes[i].fixed == model::fixed_none)
       scene.free.push_back(i);
-  for (const Spring& s : scene.model.springs)
-    if (s.kind == SpringKind::edge) {
+  for (const model::Spring& s : scene.model.springs)
+    if (s.kind == model::SpringKind::edge) {
       scene.neighbours[s.i].push_back(s.j);
       scene.neighbours[s.j].push_back(s.i);
     }
   {
-    Output output(scene.folder + "/organ.ela", {});
-    write_ela(output, scene.model, Context{});
+    formats::Output output(scene.folder + "/organ.ela", {});
+    formats::write_ela(output, scene.model, Context{});
     output.commit();
   }
   const std::uint32_t held = scene.free[scene.free.size() / 2];

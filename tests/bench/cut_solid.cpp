@@ -43,30 +43,30 @@ using namespace gewebe::timing;
 
 namespace {
 
-Model solid() {
-  TetMesh mesh = test::organ_tetrahedra("sofa_liver_smooth.obj", 23.3);
+model::Model solid() {
+  tetrahedra::TetMesh mesh = test::organ_tetrahedra("sofa_liver_smooth.obj", 23.3);
   if (mesh.tetrahedra.empty()) {
     (void)std::fputs("cut_solid: no shared data, a box instead\n", stderr);
     mesh = test::box_tetrahedra(16, 16, 16, 5);
   }
-  SolidModelOptions options;
+  fem::SolidModelOptions options;
   options.material.materials = {{"liver", 1.06e-3, 5000, 1, 0.2, 0.45}};
   options.quadratic = false;
-  Model model = solid_model(std::move(mesh), options, {});
+  model::Model model = fem::solid_model(std::move(mesh), options, {});
   Box3 box;
-  for (const Node& node : model.nodes)
+  for (const model::Node& node : model.nodes)
     box.add(node.position);
-  for (Node& node : model.nodes)
+  for (model::Node& node : model.nodes)
     if (node.position.x < box.min.x + 0.15 * box.size().x)
-      node.fixed = fixed_all;
+      node.fixed = model::fixed_all;
   model.name = "liver";
   return model;
 }
 
-double mean_edge(const Model& model) {
+double mean_edge(const model::Model& model) {
   double sum = 0;
   for (const Tetrahedron& t : model.tetrahedra)
-    for (const auto& [a, b] : tetrahedron_edges)
+    for (const auto& [a, b] : tetrahedra::tetrahedron_edges)
       sum += norm(model.nodes[t[a]].position - model.nodes[t[b]].position);
   return sum / (6 * static_cast<double>(model.tetrahedra.size()));
 }
@@ -74,10 +74,10 @@ double mean_edge(const Model& model) {
 /// Places and directions, the same in the library and through the pipe.
 class Places {
 public:
-  explicit Places(const Model& first) {
-    const std::size_t surface = surface_count(first);
+  explicit Places(const model::Model& first) {
+    const std::size_t surface = model::surface_count(first);
     for (std::size_t i = 0; i < surface; ++i)
-      if (first.nodes[i].fixed == fixed_none)
+      if (first.nodes[i].fixed == model::fixed_none)
         free_.push_back(first.nodes[i].position);
   }
   Vec3 place() { return free_[random_() % free_.size()]; }
@@ -107,22 +107,22 @@ void tell(const std::string& stage, std::vector<double> values, const char* unit
   std::fflush(stdout);
 }
 
-std::vector<std::uint8_t> near(const Model& model, const Vec3& place, double radius) {
+std::vector<std::uint8_t> near(const model::Model& model, const Vec3& place, double radius) {
   std::vector<std::uint8_t> among(model.nodes.size());
   for (std::size_t i = 0; i < among.size(); ++i)
     among[i] = norm(model.nodes[i].position - place) <= radius;
   return among;
 }
 
-std::vector<double> some_load(const Model& model) {
+std::vector<double> some_load(const model::Model& model) {
   std::vector<double> f(3 * model.nodes.size());
   for (std::size_t k = 0; k < f.size(); ++k)
     f[k] = static_cast<double>(k * 7 % 23) - 11;
   return f;
 }
 
-double least_margin(const Model& model) {
-  const TetMesh mesh = element_mesh(model);
+double least_margin(const model::Model& model) {
+  const tetrahedra::TetMesh mesh = fem::element_mesh(model);
   double least = 180;
   for (std::size_t t = 0; t < mesh.tetrahedra.size(); ++t)
     least = test::smaller(least, test::least_margin(mesh, t));
@@ -130,11 +130,11 @@ double least_margin(const Model& model) {
 }
 
 /// Shapes under one load, by the factor that follows and by one of its own.
-double error_of(const Model& model, ComplianceSource& source) {
+double error_of(const model::Model& model, compliance::ComplianceSource& source) {
   std::vector<double> is = some_load(model), want = is;
   source.solve(is, 1);
-  const StiffnessMatrix matrix = stiffness_matrix(model);
-  const Factor factor(matrix, with_threads(1));
+  const linalg::StiffnessMatrix matrix = fem::stiffness_matrix(model);
+  const linalg::Factor factor(matrix, with_threads(1));
   std::vector<double> rows(matrix.order());
   for (std::size_t k = 0; k < rows.size(); ++k)
     rows[k] = want[static_cast<std::size_t>(matrix.axis_of_row[k])];
@@ -150,16 +150,16 @@ double error_of(const Model& model, ComplianceSource& source) {
 }
 
 /// Some ten nodes of the surface lie beyond it.
-double far_plane(const Model& model) {
+double far_plane(const model::Model& model) {
   std::vector<double> x;
-  const std::size_t surface = surface_count(model);
+  const std::size_t surface = model::surface_count(model);
   for (std::size_t i = 0; i < surface; ++i)
     x.push_back(model.nodes[i].position.x);
   std::ranges::sort(x);
   return x[x.size() - 11];
 }
 
-std::vector<std::uint32_t> far_end(const Model& model) {
+std::vector<std::uint32_t> far_end(const model::Model& model) {
   const double plane = far_plane(model);
   std::vector<std::uint32_t> nodes;
   for (std::uint32_t i = 0; i < model.nodes.size(); ++i)
@@ -168,10 +168,10 @@ std::vector<std::uint32_t> far_end(const Model& model) {
   return nodes;
 }
 
-void in_library(const Model& first, std::size_t cuts, bool errors) {
+void in_library(const model::Model& first, std::size_t cuts, bool errors) {
   const double radius = 1.72 * mean_edge(first);
-  auto model = std::make_shared<const Model>(first);
-  CutStiffness stiffness(model, nullptr, with_threads(1));
+  auto model = std::make_shared<const model::Model>(first);
+  update::CutStiffness stiffness(model, nullptr, with_threads(1));
   std::printf("first factor,%.6g,,,,ms\n", processor_milliseconds([&] { stiffness.prepare(); }));
   Places places(first);
   std::vector<double> elements, follow, change, some, solve, all, computed, operations, separated,
@@ -180,30 +180,31 @@ void in_library(const Model& first, std::size_t cuts, bool errors) {
   for (std::size_t attempt = 0; all.size() < cuts && attempt < 5 * cuts; ++attempt) {
     const Vec3 place = places.place(), normal = places.normal();
     const std::vector<std::uint8_t> among = near(*model, place, radius);
-    BladeCutOptions options;
+    incision::BladeCutOptions options;
     options.among = among;
-    SolidCut cut;
-    CutModel step;
+    cutting::SolidCut cut;
+    cutting::CutModel step;
     const double t0 = processor_milliseconds([&] {
-      cut = cut_solid(*model, plane_blade(*model, {place, normal}), options);
+      cut = cutting::cut_solid(*model, cutting::plane_blade(*model, {place, normal}), options);
     });
     if (cut.report.doubled == 0)
       continue;
     const auto number = static_cast<double>(cut.report.separated);
-    const double t1 = processor_milliseconds([&] { step = as_cut_model(*model, std::move(cut)); });
-    FreeParts parts;
-    const double t2 = processor_milliseconds([&] { parts = free_parts(*model, step); });
+    const double t1 =
+        processor_milliseconds([&] { step = cutting::as_cut_model(*model, std::move(cut)); });
+    cutting::FreeParts parts;
+    const double t2 = processor_milliseconds([&] { parts = cutting::free_parts(*model, step); });
     if (!parts.parts.empty())
       continue;
-    auto next = std::make_shared<const Model>(std::move(step.model));
-    CutWork work;
+    auto next = std::make_shared<const model::Model>(std::move(step.model));
+    update::CutWork work;
     const double t3 =
         processor_milliseconds([&] { work = stiffness.cut(next, step.origin, step.place); });
-    const std::shared_ptr<ComplianceSource> source = stiffness.compliance();
+    const std::shared_ptr<compliance::ComplianceSource> source = stiffness.compliance();
     const std::vector<std::uint32_t> end = far_end(*next);
     const double t5 = processor_milliseconds([&] {
       source->blocks()->need(end);
-      (void)source->blocks()->answers(weight_of(*next, {0, 0, -9810}), end);
+      (void)source->blocks()->answers(fem::weight_of(*next, {0, 0, -9810}), end);
     });
     std::vector<double> f = some_load(*next);
     const double t4 = processor_milliseconds([&] { source->solve(f, 1); });
@@ -216,14 +217,14 @@ void in_library(const Model& first, std::size_t cuts, bool errors) {
     all.push_back(t0 + t1 + t2 + t3 + t4 + t5);
     computed.push_back(100 * work.factor.operations / work.factor.all_operations);
     operations.push_back(1e-9 * work.factor.operations);
-    fresh += work.way == CutWay::fresh ? 1 : 0;
+    fresh += work.way == update::CutWay::fresh ? 1 : 0;
     model = next;
     if (errors)
       error.push_back(error_of(*model, *source));
   }
-  for (const Node& node : model->nodes)
+  for (const model::Node& node : model->nodes)
     mass += node.mass;
-  volume = signed_volume(surface_mesh(*model));
+  volume = signed_volume(model::surface_mesh(*model));
   tell("tetrahedra passed", separated, "tetrahedra");
   tell("elements and surface", elements, "ms");
   tell("nodes and pieces", follow, "ms");
@@ -235,12 +236,12 @@ void in_library(const Model& first, std::size_t cuts, bool errors) {
   tell("operations", operations, "1e9");
   tell("error of shapes", error, "of the largest");
   std::printf("factors in a new order,%.0f,,,,of %zu\n", fresh, all.size());
-  std::printf("mass lost,%.3g,,,,of it\n", std::abs(mass / total_mass(first) - 1));
+  std::printf("mass lost,%.3g,,,,of it\n", std::abs(mass / model::total_mass(first) - 1));
   std::printf("volume lost,%.3g,,,,of it\n",
-              std::abs(volume / signed_volume(surface_mesh(first)) - 1));
+              std::abs(volume / signed_volume(model::surface_mesh(first)) - 1));
   std::printf("least angle before,%.4g,,,,degrees\n", least_margin(first));
   std::printf("least angle after,%.4g,,,,degrees\n", least_margin(*model));
-  const StiffnessMatrix matrix = stiffness_matrix(*model);
+  const linalg::StiffnessMatrix matrix = fem::stiffness_matrix(*model);
   CholmodPeer peer(matrix, true);
   const double order = processor_milliseconds([&] { peer.order(); });
   std::vector<double> times;
@@ -256,14 +257,14 @@ std::string numbers(const Vec3& v, char by) {
   return text.data();
 }
 
-void through_the_pipe(const Model& first, std::size_t cuts, bool surfaces, int threads) {
+void through_the_pipe(const model::Model& first, std::size_t cuts, bool surfaces, int threads) {
   const std::string tools = std::filesystem::read_symlink("/proc/self/exe").parent_path().string();
   std::string folder = (std::filesystem::temp_directory_path() / "gewebe-bench-XXXXXX").string();
   if (mkdtemp(folder.data()) == nullptr)
     Served::fail("no folder in " + std::filesystem::temp_directory_path().string());
   {
-    Output output(folder + "/liver.ela", {});
-    write_ela(output, first, Context{});
+    formats::Output output(folder + "/liver.ela", {});
+    formats::write_ela(output, first, Context{});
     output.commit();
   }
   const double radius = 1.72 * mean_edge(first);
@@ -321,7 +322,7 @@ int main(int argc, char** argv) {
       errors = true;
     else
       cuts = static_cast<std::size_t>(std::strtoul(argv[k], nullptr, 10));
-  const Model model = solid();
+  const model::Model model = solid();
   std::puts("stage,median,p90,p99,largest,unit");
   std::printf("tetrahedra,%zu,,,,\nnodes,%zu,,,,\n", model.tetrahedra.size(), model.nodes.size());
   in_library(model, cuts, errors);

@@ -91,7 +91,7 @@ __attribute__((target("avx512f"))) void run_peak_avx512() {
 /// A level's kernel and what its vectors can do at the most.
 struct Level {
   const char* name;
-  DensityKernel add;
+  density::DensityKernel add;
   void (*run_peak)();
   double peak_flops;
 };
@@ -100,17 +100,17 @@ std::vector<Level> levels() {
   constexpr double flops = 2.0 * peak_chains * peak_rounds;
   std::vector<Level> found;
   if (best_cpu_level() >= CpuLevel::avx2)
-    found.push_back({"avx2", add_density_avx2, run_peak_avx2, 8 * flops});
+    found.push_back({"avx2", density::add_density_avx2, run_peak_avx2, 8 * flops});
   if (best_cpu_level() >= CpuLevel::avx512)
-    found.push_back({"avx512", add_density_avx512, run_peak_avx512, 16 * flops});
+    found.push_back({"avx512", density::add_density_avx512, run_peak_avx512, 16 * flops});
   return found;
 }
 
 /// Particles of radius R (voxels) that reach the leaf at the origin, evenly spread.
-std::vector<LeafParticle> in_reach(double R, std::size_t count) {
+std::vector<density::LeafParticle> in_reach(double R, std::size_t count) {
   std::mt19937 random(1);
   std::uniform_real_distribution<double> unit(-1, 1);
-  std::vector<LeafParticle> particles;
+  std::vector<density::LeafParticle> particles;
   while (particles.size() < count) {
     double center[3], distance2 = 0;
     for (double& c : center) {
@@ -132,9 +132,9 @@ void bench_kernel() {
   constexpr std::size_t count = 96;
   constexpr int repeats = 200;
   for (const double R : {3.0, 6.0, 12.0, 40.0, 1000.0}) {
-    const std::vector<LeafParticle> particles = in_reach(R, count);
+    const std::vector<density::LeafParticle> particles = in_reach(R, count);
     std::uint64_t useful = 0; // voxels in rows that meet the support
-    for (const LeafParticle& p : particles)
+    for (const density::LeafParticle& p : particles)
       for (int row = 0; row < 64; ++row) {
         const double x = (row >> 3) - static_cast<double>(p.x),
                      y = (row & 7) - static_cast<double>(p.y),
@@ -144,7 +144,7 @@ void bench_kernel() {
     const double evaluations = static_cast<double>(useful) * repeats;
     for (const Level& level : levels()) {
       std::vector<double> times, peaks, fractions;
-      alignas(64) std::array<float, leaf_voxels> values{};
+      alignas(64) std::array<float, volume::leaf_voxels> values{};
       for (int run = 0; run < 21; ++run) {
         const double peak = milliseconds(level.run_peak);
         const double time = milliseconds([&] {
@@ -172,7 +172,7 @@ void bench_kernel() {
 // ---- plain and band
 
 /// Balls of support R(1 ± 0.25) in a cube of 100 mm that their supports fill.
-Particles scene(int count, double R) {
+Particles random_scene(int count, double R) {
   std::mt19937 random(1);
   std::uniform_real_distribution<double> unit(0, 1);
   Particles particles;
@@ -187,27 +187,27 @@ Particles scene(int count, double R) {
 
 struct Measured {
   Times times;
-  DensityReport report;
+  density::DensityReport report;
   double error; // over a sample of the voxels, against double
 };
 
 Measured measure_density(const Particles& particles, double voxel, bool band, int threads) {
-  DensityOptions options;
-  options.info.transform = uniform_transform(voxel);
+  density::DensityOptions options;
+  options.info.transform = volume::uniform_transform(voxel);
   if (band)
     options.band = 0.5;
   Measured result{};
   std::vector<double> times;
   for (int run = 0; run < runs; ++run) {
-    Grid grid; // its memory is given back outside the measurement
+    volume::Grid grid; // its memory is given back outside the measurement
     times.push_back(milliseconds([&] {
-      grid = metaball_density(with_threads(threads), particles, options, &result.report);
+      grid = density::metaball_density(with_threads(threads), particles, options, &result.report);
     }));
     if (run > 0)
       continue;
-    const std::vector<LeafView> leaves = grid.leaves();
+    const std::vector<volume::LeafView> leaves = grid.leaves();
     for (std::size_t n = 0; n < leaves.size(); n += 1 + leaves.size() / 2000) {
-      const int offset = static_cast<int>(n * 61 % leaf_voxels);
+      const int offset = static_cast<int>(n * 61 % volume::leaf_voxels);
       const Int3& o = leaves[n].origin;
       const Vec3 x = options.info.transform.to_world({1.0 * (o[0] + (offset >> 6)),
                                                       1.0 * (o[1] + (offset >> 3 & 7)),
@@ -233,7 +233,7 @@ void bench_band() {
   };
   for (const auto& [count, R] : {Case{5, 30}, Case{20, 22}, Case{100, 12}, Case{1000, 6},
                                  Case{20000, 1.2}, Case{100000, 0.4}}) {
-    const Particles particles = scene(count, R);
+    const Particles particles = random_scene(count, R);
     const double voxel = 100.0 / 1024;
     for (const int threads : {1, 2}) {
       const Measured plain = measure_density(particles, voxel, false, threads);
@@ -248,7 +248,7 @@ void bench_band() {
 }
 
 void bench_scaling() {
-  const Particles particles = scene(20, 22);
+  const Particles particles = random_scene(20, 22);
   for (const int dim : {256, 512, 1024, 2048}) {
     const double voxel = 100.0 / dim;
     for (const int threads : {1, 2}) {
@@ -305,19 +305,19 @@ void bench_splashsurf() {
     double fastest = 0;
     std::size_t vertices = 0;
     for (const bool band : {false, true}) {
-      DensityOptions options;
-      options.info.transform = uniform_transform(voxel);
+      density::DensityOptions options;
+      options.info.transform = volume::uniform_transform(voxel);
       if (band)
         options.band = 0.5;
       std::vector<double> times;
       for (int run = 0; run < runs; ++run) {
-        Grid grid;
-        IsoSurface surface;
-        SnapResult snapped;
+        volume::Grid grid;
+        surface::IsoSurface surface;
+        surface::SnapResult snapped;
         times.push_back(milliseconds([&] {
-          grid = metaball_density(with_threads(threads), particles, options);
-          surface = marching_cubes_to_snap(with_threads(threads), grid);
-          snapped = snap(with_threads(threads), surface, {});
+          grid = density::metaball_density(with_threads(threads), particles, options);
+          surface = surface::marching_cubes_to_snap(with_threads(threads), grid);
+          snapped = surface::snap(with_threads(threads), surface, {});
         }));
         vertices = snapped.mesh.points.size();
       }

@@ -33,18 +33,18 @@ void print(const std::string& stage, const char* program, std::size_t springs, d
                static_cast<double>(springs) * steps / t.median / 1e3);
 }
 
-Load push(const Model& model) {
-  Load load{.gravity = {0, 0, -9810}};
-  load.force[static_cast<std::uint32_t>(surface_count(model) / 2)] = {500, 0, 0};
+contact::Load push(const model::Model& model) {
+  contact::Load load{.gravity = {0, 0, -9810}};
+  load.force[static_cast<std::uint32_t>(model::surface_count(model) / 2)] = {500, 0, 0};
   return load;
 }
 
 /// What one would write first.
 class PlainLoop {
 public:
-  explicit PlainLoop(const Model& model) : model_(model) {
-    for (const Node& n : model.nodes)
-      points_.push_back({n.position, {}, {}, n.mass, n.drag, n.fixed == fixed_all});
+  explicit PlainLoop(const model::Model& model) : model_(model) {
+    for (const model::Node& n : model.nodes)
+      points_.push_back({n.position, {}, {}, n.mass, n.drag, n.fixed == model::fixed_all});
     load_ = push(model);
   }
 
@@ -53,7 +53,7 @@ public:
       p.force = p.mass * load_.gravity - p.drag * p.v;
     for (const auto& [node, force] : load_.force)
       points_[node].force += force;
-    for (const Spring& s : model_.springs) {
+    for (const model::Spring& s : model_.springs) {
       Point &i = points_[s.i], &j = points_[s.j];
       const Vec3 d = j.x - i.x;
       const double l = norm(d);
@@ -77,14 +77,14 @@ private:
     double mass, drag;
     bool fixed;
   };
-  const Model& model_;
-  Load load_;
+  const model::Model& model_;
+  contact::Load load_;
   std::vector<Point> points_;
 };
 
-std::vector<Vec3> moved(const Elastodynamic& object) {
+std::vector<Vec3> moved(const dynamics::Elastodynamic& object) {
   std::vector<Vec3> u;
-  for (const NodeMotion& m : object.motion())
+  for (const dynamics::NodeMotion& m : object.motion())
     u.push_back(m.displacement);
   return u;
 }
@@ -99,8 +99,9 @@ double difference(const std::vector<Vec3>& a, const std::vector<Vec3>& b) {
   return error / size;
 }
 
-std::vector<Vec3> run(const Model& model, double duration, double h, const Context& context) {
-  Elastodynamic object(model);
+std::vector<Vec3> run(const model::Model& model, double duration, double h,
+                      const Context& context) {
+  dynamics::Elastodynamic object(model);
   object.set_load(push(model));
   (void)object.advance(duration, h, context);
   return moved(object);
@@ -140,21 +141,22 @@ double limit(std::size_t springs, double steps) {
 }
 
 /// The same net in Taichi; false where there is none.
-bool taichi(const Model& model, double h, int steps, int threads, const char* precision,
+bool taichi(const model::Model& model, double h, int steps, int threads, const char* precision,
             Times& times, std::vector<Vec3>& u) {
   constexpr int runs = 3;
   const std::string path =
       (std::filesystem::temp_directory_path() / ("ela-" + std::to_string(getpid()))).string();
-  const Load load = push(model);
+  const contact::Load load = push(model);
   std::vector<double> numbers;
   for (std::uint32_t i = 0; i < model.nodes.size(); ++i) {
-    const Node& n = model.nodes[i];
+    const model::Node& n = model.nodes[i];
     const auto force = load.force.find(i);
     const Vec3 outer = n.mass * load.gravity + (force != load.force.end() ? force->second : Vec3{});
-    numbers.insert(numbers.end(), {n.position.x, n.position.y, n.position.z, n.mass, n.drag,
-                                   outer.x, outer.y, outer.z, n.fixed == fixed_all ? 0.0 : 1.0});
+    numbers.insert(numbers.end(),
+                   {n.position.x, n.position.y, n.position.z, n.mass, n.drag, outer.x, outer.y,
+                    outer.z, n.fixed == model::fixed_all ? 0.0 : 1.0});
   }
-  for (const Spring& s : model.springs)
+  for (const model::Spring& s : model.springs)
     numbers.insert(numbers.end(), {1.0 * s.i, 1.0 * s.j, s.stiffness, s.damping, s.rest});
   {
     const std::uint64_t counts[2] = {model.nodes.size(), model.springs.size()};
@@ -179,9 +181,9 @@ bool taichi(const Model& model, double h, int steps, int threads, const char* pr
   return made;
 }
 
-void speed(const Model& model, double steps) {
+void speed(const model::Model& model, double steps) {
   const std::string stage = "speed " + std::to_string(model.nodes.size()) + " nodes";
-  const double h = 0.9 * safe_step(model);
+  const double h = 0.9 * model::safe_step(model);
   constexpr int runs = 7;
   std::vector<Vec3> plain_u;
   std::vector<double> plain_times;
@@ -200,11 +202,11 @@ void speed(const Model& model, double steps) {
   print(stage, "root and division alone", model.springs.size(), steps, 1,
         {allowed, allowed, allowed}, 0);
   for (const int threads : {1, 2}) {
-    Elastodynamic object(model);
+    dynamics::Elastodynamic object(model);
     std::vector<Vec3> u;
     std::vector<double> times;
     for (int run = 0; run < runs; ++run) {
-      object.set_motion(std::vector<NodeMotion>(model.nodes.size()));
+      object.set_motion(std::vector<dynamics::NodeMotion>(model.nodes.size()));
       object.set_load(push(model));
       times.push_back(timing::milliseconds(
           [&] { (void)object.advance(steps * h, h, timing::with_threads(threads)); }));
@@ -222,8 +224,8 @@ void speed(const Model& model, double steps) {
   }
 }
 
-void work_precision(const Model& model) {
-  const double safe = safe_step(model), duration = 400 * safe;
+void work_precision(const model::Model& model) {
+  const double safe = model::safe_step(model), duration = 400 * safe;
   const Context one = timing::with_threads(1);
   const std::vector<Vec3> exact = run(model, duration, safe / 64, one);
   const std::string stage = "motion " + std::to_string(model.nodes.size()) + " nodes";
@@ -246,9 +248,9 @@ void work_precision(const Model& model) {
     }
 }
 
-void sleeping(const Model& model) {
-  Elastodynamic object(model);
-  const double h = 0.9 * safe_step(model);
+void sleeping(const model::Model& model) {
+  dynamics::Elastodynamic object(model);
+  const double h = 0.9 * model::safe_step(model);
   constexpr int calls = 100000;
   const double time = timing::milliseconds([&] {
     for (int k = 0; k < calls; ++k)
@@ -262,9 +264,11 @@ void sleeping(const Model& model) {
 int main() {
   std::puts("stage,program,springs,steps,threads,median_ms,fastest_ms,slowest_ms,error,measure");
   const auto sphere = [](const char* text) {
-    return build_model(primitive_mesh(parse_primitive(text, "60")), {}, Context{}).model;
+    return model::build_model(model::primitive_mesh(model::parse_primitive(text, "60")), {},
+                              Context{})
+        .model;
   };
-  const Model organ = sphere("sphere:100x100");
+  const model::Model organ = sphere("sphere:100x100");
   speed(organ, 300);
   speed(sphere("sphere:316x316"), 20);
   sleeping(organ);

@@ -80,7 +80,7 @@ double product_rate() {
 
 /// Two fronts, the second as wide as the first is below its columns.
 void bench_front(std::size_t eliminated, std::size_t below, double rate) {
-  FrontTree tree;
+  cholesky::FrontTree tree;
   const std::size_t nodes = eliminated + below;
   for (std::uint32_t i = 0; i < nodes; ++i) {
     tree.sequence.push_back(i);
@@ -89,14 +89,14 @@ void bench_front(std::size_t eliminated, std::size_t below, double rate) {
       tree.boundary.push_back(i);
   }
   tree.first = {0, static_cast<std::uint32_t>(eliminated), static_cast<std::uint32_t>(nodes)};
-  tree.parent = {1, FrontTree::none};
+  tree.parent = {1, cholesky::FrontTree::none};
   tree.start = {0, below, below};
   const std::vector<std::uint8_t> axes(nodes, 3);
-  std::vector<Front> fronts(2);
-  std::vector<double> l(measure_fronts(tree, axes, fronts));
+  std::vector<cholesky::Front> fronts(2);
+  std::vector<double> l(cholesky::measure_fronts(tree, axes, fronts));
   fronts[0].l = l.data();
   fronts[1].l = l.data() + fronts[0].entries();
-  const auto assemble = [&](const FrontAssembly& to) {
+  const auto assemble = [&](const cholesky::FrontAssembly& to) {
     for (std::size_t c = 0; c < fronts[to.front].columns; ++c) {
       std::fill_n(&to.at(c, c), to.rows - c, -0.5);
       to.at(c, c) = 2.0 * static_cast<double>(l.size());
@@ -106,12 +106,13 @@ void bench_front(std::size_t eliminated, std::size_t below, double rate) {
   for (const int threads : {1, 2}) {
     const Times times = timed(
         [&] {
-          (void)factorise({.tree = tree, .axes = axes, .fronts = fronts, .assemble = assemble}, {},
-                          with_threads(threads));
+          (void)cholesky::factorise(
+              {.tree = tree, .axes = axes, .fronts = fronts, .assemble = assemble}, {},
+              with_threads(threads));
         },
         threads, 5);
     double all = 0;
-    for (const Front& f : fronts)
+    for (const cholesky::Front& f : fronts)
       all += operations(static_cast<double>(f.columns), static_cast<double>(f.below()));
     const double now = all / times.fastest * 1e-6;
     report("two fronts", "gewebe", 3 * nodes, 3 * eliminated, threads, times, now, "GFLOP/s");
@@ -126,10 +127,10 @@ void bench_front(std::size_t eliminated, std::size_t below, double rate) {
   }
 }
 
-void bench_matrix(const char* stage, const StiffnessMatrix& matrix, bool peers) {
+void bench_matrix(const char* stage, const linalg::StiffnessMatrix& matrix, bool peers) {
   const std::size_t rows = matrix.order();
   const int runs = rows > 30000 ? 3 : 7;
-  std::optional<Factor> factor;
+  std::optional<linalg::Factor> factor;
   const auto say = [&](const char* what, const char* program, std::size_t columns, int threads,
                        const Times& times, double figure, const char* unit) {
     report((std::string(stage) + ", " + what).c_str(), program, rows, columns, threads, times,
@@ -190,13 +191,14 @@ double peak_memory(const std::function<void()>& work) {
 }
 
 void bench_memory(std::size_t side) {
-  const StiffnessMatrix matrix = stiffness_matrix(test::block_of_material(side));
+  const linalg::StiffnessMatrix matrix = fem::stiffness_matrix(test::block_of_material(side));
   const double nothing = peak_memory([] {});
   double ours = 0;
   for (const int threads : {1, 2}) {
     double max = 0;
     const Times times = timed(
-        [&] { max = peak_memory([&] { const Factor f(matrix, with_threads(threads)); }); }, 2, 1);
+        [&] { max = peak_memory([&] { const linalg::Factor f(matrix, with_threads(threads)); }); },
+        2, 1);
     ours = threads == 1 ? max - nothing : ours;
     report("memory", "gewebe", matrix.order(), 0, threads, times, max - nothing, "MB");
   }
@@ -228,10 +230,10 @@ int main(int count, char** words) {
     for (const std::size_t below : std::initializer_list<std::size_t>{0, 400, 1000})
       bench_front(400, below, rate);
   if (wanted("net"))
-    bench_matrix("net", stiffness_matrix(test::model_of(test::sphere_mesh(5, 100, {}))), true);
+    bench_matrix("net", fem::stiffness_matrix(test::model_of(test::sphere_mesh(5, 100, {}))), true);
   if (wanted("blocks"))
     for (const std::size_t side : std::initializer_list<std::size_t>{12, 20, 28})
-      bench_matrix("block", stiffness_matrix(test::block_of_material(side)), true);
+      bench_matrix("block", fem::stiffness_matrix(test::block_of_material(side)), true);
   if (wanted("memory"))
     bench_memory(47);
   return EXIT_SUCCESS;

@@ -28,10 +28,10 @@ void report(const char* stage, const char* program, double voxel, std::size_t si
   std::fflush(stdout);
 }
 
-Grid ball(double voxel, double support) {
-  DensityOptions options;
-  options.info.transform = uniform_transform(voxel);
-  return metaball_density({}, {{{0.1, 0.2, 0.3}, support, 1}}, options);
+volume::Grid ball(double voxel, double support) {
+  density::DensityOptions options;
+  options.info.transform = volume::uniform_transform(voxel);
+  return density::metaball_density({}, {{{0.1, 0.2, 0.3}, support, 1}}, options);
 }
 
 template <class Points>
@@ -44,17 +44,17 @@ double radial_error(const Points& points, double radius) {
 
 void bench_surface(double voxel) {
   constexpr double support = 40; // so the surface at 0.5 has radius 20
-  const Grid grid = ball(voxel, support);
+  const volume::Grid grid = ball(voxel, support);
   for (const int threads : {1, 2}) {
-    IsoSurface surface;
+    surface::IsoSurface surface;
     const Context context = with_threads(threads);
-    Times times = measure([&] { surface = marching_cubes(context, grid); });
+    Times times = measure([&] { surface = surface::marching_cubes(context, grid); });
     report("surface", "marching cubes", voxel, surface.mesh.triangles.size(), threads, times,
            radial_error(surface.mesh.points, support / 2), "mean distance mm");
-    SnapResult snapped;
+    surface::SnapResult snapped;
     times = measure([&] {
-      surface = marching_cubes_to_snap(context, grid);
-      snapped = snap(context, surface, {});
+      surface = surface::marching_cubes_to_snap(context, grid);
+      snapped = surface::snap(context, surface, {});
     });
     report("surface", "mc-opt 0.15", voxel, snapped.mesh.triangles.size(), threads, times,
            radial_error(snapped.mesh.points, support / 2), "mean distance mm");

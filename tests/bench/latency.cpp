@@ -140,7 +140,7 @@ void wait_until(double when) {
   }
 }
 
-std::string text(const Vec3& v) {
+std::string vector_text(const Vec3& v) {
   std::array<char, 96> one{};
   (void)std::snprintf(one.data(), one.size(), "%.9g %.9g %.9g", v.x, v.y, v.z);
   return one.data();
@@ -187,7 +187,7 @@ Run drive(const Served& served, const Wanted& w, double edge) {
              "\nprepare organ contact\nemit forces\nemit instruments\n");
   for (std::size_t k = 0; k < w.spheres; ++k)
     served.say("instrument tool" + std::to_string(k) + " sphere " + std::to_string(radius) + " " +
-               text(place(k, 0)) + "\n");
+               vector_text(place(k, 0)) + "\n");
   served.say("step 0\n");
   (void)served.hear();
   Run run;
@@ -202,7 +202,7 @@ Run drive(const Served& served, const Wanted& w, double edge) {
     const double time = static_cast<double>(step) * tick, due = begin + time;
     std::string lines;
     for (std::size_t k = 0; k < w.spheres; ++k)
-      lines += "move tool" + std::to_string(k) + " " + text(place(k, time)) + "\n";
+      lines += "move tool" + std::to_string(k) + " " + vector_text(place(k, time)) + "\n";
     lines += "step 0.001\n";
     wait_until(due);
     const double asked = now();
@@ -307,10 +307,11 @@ int main(int argc, char** argv) {
   std::string folder = (std::filesystem::temp_directory_path() / "gewebe-bench-XXXXXX").string();
   if (mkdtemp(folder.data()) == nullptr)
     Served::fail("no folder in " + std::filesystem::temp_directory_path().string());
-  const Model model = build_model(test::sphere_mesh(5, ball, {}), {}, Context{}).model;
+  const model::Model model =
+      model::build_model(test::sphere_mesh(5, ball, {}), {}, Context{}).model;
   {
-    Output output(folder + "/organ.ela", {});
-    write_ela(output, model, Context{});
+    formats::Output output(folder + "/organ.ela", {});
+    formats::write_ela(output, model, Context{});
     output.commit();
   }
   if (w.store &&

@@ -13,7 +13,7 @@
 
 namespace gewebe::timing {
 
-class MemoryColumns final : public ColumnSource, public ColumnSink {
+class MemoryColumns final : public columns::ColumnSource, public columns::ColumnSink {
 public:
   /// With rows for the first `rows` of `count` nodes.
   MemoryColumns(std::size_t count, std::vector<std::uint32_t> nodes, bool single, std::size_t rows)
@@ -38,13 +38,15 @@ private:
 
 /// Factor and columns of these nodes (ascending), as float32 where `single`, with rows for the
 /// first `row_nodes` nodes, or for all if there are fewer.
-inline StoredStiffness memory_stiffness(const StiffnessMatrix& matrix, const FactorData& data,
-                                        const std::vector<std::uint32_t>& nodes, bool single,
-                                        std::size_t row_nodes = SIZE_MAX) {
+inline compliance::StoredStiffness memory_stiffness(const linalg::StiffnessMatrix& matrix,
+                                                    const linalg::FactorData& data,
+                                                    const std::vector<std::uint32_t>& nodes,
+                                                    bool single, std::size_t row_nodes = SIZE_MAX) {
   const std::size_t count = matrix.row_of_axis.size() / 3, rows = std::min(row_nodes, count);
   auto columns = std::make_unique<MemoryColumns>(count, nodes, single, rows);
-  (void)compliance_columns(matrix, Factor(data), stiffness_norm(matrix), nodes, {}, *columns, rows);
-  return {std::move(columns), [&data] { return Factor(data); }};
+  (void)columns::compliance_columns(matrix, linalg::Factor(data), linalg::stiffness_norm(matrix),
+                                    nodes, {}, *columns, rows);
+  return {std::move(columns), [&data] { return linalg::Factor(data); }};
 }
 
 } // namespace gewebe::timing

@@ -38,10 +38,10 @@ constexpr int views = 16;
 struct Scene {
   std::size_t triangles = 0;
   test::OracleScene oracle;
-  SurfaceMaterial material;
-  std::vector<Camera> cameras;
-  std::vector<Projection> projections;
-  std::map<bool, Drawing> drawings;             ///< with frames, without
+  texture::SurfaceMaterial material;
+  std::vector<shading::Camera> cameras;
+  std::vector<shading::Projection> projections;
+  std::map<bool, shading::Drawing> drawings;    ///< with frames, without
   std::map<bool, test::OraclePicture> pictures; ///< of the first camera
 };
 
@@ -49,36 +49,36 @@ Scene make_scene(std::size_t wanted, bool with_oracle) {
   Scene scene;
   const auto across =
       static_cast<std::uint32_t>(std::lround(std::sqrt(static_cast<double>(wanted) / 4)));
-  std::vector<Surface> surfaces(1);
+  std::vector<shading::Surface> surfaces(1);
   surfaces[0].mesh = test::torus(2 * across, across, false);
   scene.triangles = surfaces[0].mesh.triangles.size();
   scene.oracle.mesh = surfaces[0].mesh;
   scene.oracle.base = test::spots(256, 256, 3);
   scene.oracle.structure = test::spots(256, 256, 1);
   scene.oracle.offset = 0.01;
-  scene.material.base = texture_from(*scene.oracle.base);
-  scene.material.structure = texture_from(*scene.oracle.structure);
+  scene.material.base = texture::texture_from(*scene.oracle.base);
+  scene.material.structure = texture::texture_from(*scene.oracle.structure);
   scene.material.background = {0, 0, 0};
-  CameraOptions view;
+  shading::CameraOptions view;
   view.view = "iso";
   for (int n = 0; n < views; ++n) {
     view.azimuth = 360.0 * n / views;
-    scene.cameras.push_back(make_camera(view, rest_box(surfaces), side, side));
+    scene.cameras.push_back(shading::make_camera(view, shading::rest_box(surfaces), side, side));
   }
-  DrawingOptions options;
+  shading::DrawingOptions options;
   options.texcoords = options.structure = true;
-  options.light = scene.oracle.light = default_light(scene.cameras[0]);
+  options.light = scene.oracle.light = shading::default_light(scene.cameras[0]);
   options.offset = {scene.oracle.offset, scene.oracle.offset};
   for (const bool per_pixel : {true, false}) {
     options.per_pixel = scene.oracle.per_pixel = per_pixel;
-    scene.drawings[per_pixel] = make_drawing(surfaces, options, {});
+    scene.drawings[per_pixel] = shading::make_drawing(surfaces, options, {});
     if (with_oracle)
       scene.pictures[per_pixel] = test::oracle_picture(scene.oracle, scene.cameras[0], side, side);
   }
-  const Drawing& drawing = scene.drawings[false];
-  for (const Camera& camera : scene.cameras)
+  const shading::Drawing& drawing = scene.drawings[false];
+  for (const shading::Camera& camera : scene.cameras)
     scene.projections.push_back(
-        make_projection(camera, drawing.box, drawing.origin, drawing.scale));
+        shading::make_projection(camera, drawing.box, drawing.origin, drawing.scale));
   return scene;
 }
 
@@ -95,7 +95,7 @@ Times frame_times(const std::function<void(int)>& draw) {
 }
 
 void report(const Scene& scene, const std::string& program, int threads, const Times& times,
-            const Image& first, bool per_pixel) {
+            const texture::Image& first, bool per_pixel) {
   const double error = test::compare(first, scene.pictures.at(per_pixel)).rms_rounded;
   for (const bool scaling : {true, false}) {
     std::printf(
@@ -110,10 +110,10 @@ void report(const Scene& scene, const std::string& program, int threads, const T
 void by_cpu(const Scene& scene, int threads) {
   for (const bool per_pixel : {true, false}) {
     const Context context = with_threads(threads);
-    const Drawing& drawing = scene.drawings.at(per_pixel);
+    const shading::Drawing& drawing = scene.drawings.at(per_pixel);
     const auto draw = [&](int n) {
-      return render_cpu(drawing, scene.projections[static_cast<std::size_t>(n)], scene.material,
-                        side, side, 1, context);
+      return raster::render_cpu(drawing, scene.projections[static_cast<std::size_t>(n)],
+                                scene.material, side, side, 1, context);
     };
     const Times times = frame_times([&](int n) { (void)draw(n); });
     report(scene, per_pixel ? "cpu" : "cpu by vertex", threads, times, draw(0), per_pixel);
@@ -121,14 +121,15 @@ void by_cpu(const Scene& scene, int threads) {
 }
 
 void by_gl(const Scene& scene, const std::string& suffix) {
-  GlContext gl;
-  for (const GlMode mode : {GlMode::passes3, GlMode::passes2, GlMode::passes1, GlMode::shader})
+  gl::GlContext gl;
+  for (const gl::GlMode mode :
+       {gl::GlMode::passes3, gl::GlMode::passes2, gl::GlMode::passes1, gl::GlMode::shader})
     for (const bool wide : {false, true}) {
-      GlOptions options;
+      gl::GlOptions options;
       options.mode = mode;
       options.wide = wide;
-      const bool per_pixel = mode == GlMode::shader;
-      GlRenderer renderer(gl, scene.material, side, side, options);
+      const bool per_pixel = mode == gl::GlMode::shader;
+      gl::GlRenderer renderer(gl, scene.material, side, side, options);
       renderer.set_drawing(scene.drawings.at(per_pixel));
       const auto draw = [&](int n) {
         renderer.draw(scene.projections[static_cast<std::size_t>(n)], {});
@@ -137,7 +138,7 @@ void by_gl(const Scene& scene, const std::string& suffix) {
       const Times times = frame_times(draw);
       draw(0);
       const std::string name =
-          per_pixel ? "shader" : "passes " + gl_mode_names()[static_cast<std::size_t>(mode)];
+          per_pixel ? "shader" : "passes " + gl::gl_mode_names()[static_cast<std::size_t>(mode)];
       report(scene, name + (wide ? " float" : " 8bit") + suffix, 0, times, renderer.read({}),
              per_pixel);
     }

@@ -32,9 +32,9 @@ constexpr std::uint32_t side = 512;
 struct Scene {
   std::string name;
   test::OracleScene oracle;
-  SurfaceMaterial material;
-  Drawing drawing;
-  Projection projection;
+  texture::SurfaceMaterial material;
+  shading::Drawing drawing;
+  shading::Projection projection;
   test::OraclePicture picture;
   double covered = 0; ///< pixels
 };
@@ -44,20 +44,20 @@ enum class Paint { none, image, triplanar, noise, veins };
 Scene make_scene(const std::string& name, Paint base, Paint structure) {
   Scene scene;
   scene.name = name;
-  std::vector<Surface> surfaces(1);
+  std::vector<shading::Surface> surfaces(1);
   surfaces[0].mesh = test::torus(100, 50, false);
   test::OracleScene& oracle = scene.oracle;
   oracle.mesh = surfaces[0].mesh;
-  oracle.rest = rest_mapping(rest_box(surfaces), {});
+  oracle.rest = texture::rest_mapping(shading::rest_box(surfaces), {});
   oracle.rest.triplanar = base == Paint::triplanar || structure == Paint::triplanar;
   oracle.color = {0.91, 0.62, 0.53}; // no halves of 1/255 where nothing else is
   oracle.offset = 0.01;
   oracle.per_pixel = true;
-  const auto solid = [](Paint paint) -> std::optional<SolidTexture> {
+  const auto solid = [](Paint paint) -> std::optional<texture::SolidTexture> {
     if (paint == Paint::noise)
-      return solid_texture_from_text("noise:scale=5");
+      return texture::solid_texture_from_text("noise:scale=5");
     if (paint == Paint::veins)
-      return solid_texture_from_text("veins:scale=10");
+      return texture::solid_texture_from_text("veins:scale=10");
     return {};
   };
   oracle.solid_base = scene.material.solid_base = solid(base);
@@ -67,31 +67,33 @@ Scene make_scene(const std::string& name, Paint base, Paint structure) {
   if (structure == Paint::image || structure == Paint::triplanar)
     oracle.structure = test::spots(256, 256, 1);
   if (oracle.base)
-    scene.material.base = texture_from(*oracle.base);
+    scene.material.base = texture::texture_from(*oracle.base);
   if (oracle.structure)
-    scene.material.structure = texture_from(*oracle.structure);
+    scene.material.structure = texture::texture_from(*oracle.structure);
   scene.material.rest = oracle.rest;
   scene.material.color = oracle.color;
   scene.material.background = {0, 0, 0};
-  CameraOptions view;
+  shading::CameraOptions view;
   view.view = "iso";
-  const Camera camera = make_camera(view, rest_box(surfaces), side, side);
-  DrawingOptions options;
+  const shading::Camera camera =
+      shading::make_camera(view, shading::rest_box(surfaces), side, side);
+  shading::DrawingOptions options;
   options.texcoords = base == Paint::image || structure == Paint::image;
   options.structure = structure == Paint::image;
-  options.rest = is_at_rest(scene.material);
+  options.rest = texture::is_at_rest(scene.material);
   options.rest_normals = oracle.rest.triplanar || oracle.solid_structure;
   options.rest_light = options.rest && structure != Paint::none;
   options.per_pixel = true;
-  options.light = oracle.light = default_light(camera);
+  options.light = oracle.light = shading::default_light(camera);
   options.offset = {oracle.offset, oracle.offset};
   options.camera = camera;
-  scene.drawing = make_drawing(surfaces, options, {});
-  scene.projection =
-      make_projection(camera, scene.drawing.box, scene.drawing.origin, scene.drawing.scale);
+  scene.drawing = shading::make_drawing(surfaces, options, {});
+  scene.projection = shading::make_projection(camera, scene.drawing.box, scene.drawing.origin,
+                                              scene.drawing.scale);
   scene.picture = test::oracle_picture(oracle, camera, side, side);
-  RenderReport report;
-  (void)render_cpu(scene.drawing, scene.projection, scene.material, side, side, 1, {}, &report);
+  raster::RenderReport report;
+  (void)raster::render_cpu(scene.drawing, scene.projection, scene.material, side, side, 1, {},
+                           &report);
   scene.covered = static_cast<double>(report.covered);
   return scene;
 }
@@ -109,7 +111,7 @@ Times frame_times(const std::function<void()>& draw) {
 }
 
 void report(const Scene& scene, const std::string& program, int threads, const Times& times,
-            const Image& image) {
+            const texture::Image& image) {
   const double error = test::compare(image, scene.picture).rms_rounded;
   std::printf("%s,%s,%zu,%u,%d,%.3f,%.3f,%.3f,%.4g,RMS of 255,%.1f\n", scene.name.c_str(),
               program.c_str(), scene.drawing.triangles.size(), side, threads, times.median,
@@ -120,14 +122,15 @@ void report(const Scene& scene, const std::string& program, int threads, const T
 void by_cpu(const Scene& scene, int threads) {
   const Context context = with_threads(threads);
   const auto draw = [&] {
-    return render_cpu(scene.drawing, scene.projection, scene.material, side, side, 1, context);
+    return raster::render_cpu(scene.drawing, scene.projection, scene.material, side, side, 1,
+                              context);
   };
   const Times times = frame_times([&] { (void)draw(); });
   report(scene, "cpu", threads, times, draw());
 }
 
-void by_shader(GlContext& gl, const Scene& scene) {
-  GlRenderer renderer(gl, scene.material, side, side, {});
+void by_shader(gl::GlContext& gl, const Scene& scene) {
+  gl::GlRenderer renderer(gl, scene.material, side, side, {});
   renderer.set_drawing(scene.drawing);
   const auto draw = [&] {
     renderer.draw(scene.projection, {});
@@ -142,7 +145,7 @@ void by_shader(GlContext& gl, const Scene& scene) {
 int main() {
   setenv("EGL_LOG_LEVEL", "fatal", 0);
   setenv("GALLIVM_PERF", "no_aos_sampling,no_filter_hacks", 0);
-  std::optional<GlContext> gl;
+  std::optional<gl::GlContext> gl;
   try {
     gl.emplace();
   } catch (const Error& error) {

@@ -32,49 +32,50 @@ constexpr std::size_t contacts = 30, patch = 60;
 
 struct Body {
   std::string name;
-  Model model;
-  FactorData factor{};
-  std::unique_ptr<Elastostatic> object{};
-  Load load{};
+  model::Model model;
+  linalg::FactorData factor{};
+  std::unique_ptr<statics::Elastostatic> object{};
+  contact::Load load{};
   std::vector<double> forces{}, surfaces{}, wholes{};
-  std::unique_ptr<WarpedStatics> turning{}; ///< of a solid
+  std::unique_ptr<statics::WarpedStatics> turning{}; ///< of a solid
   std::vector<double> linear_far{}, turning_far{};
 };
 
-Model solid_box(std::uint32_t nx, std::uint32_t ny, std::uint32_t nz, bool quadratic = false) {
-  SolidModelOptions options;
+model::Model solid_box(std::uint32_t nx, std::uint32_t ny, std::uint32_t nz,
+                       bool quadratic = false) {
+  fem::SolidModelOptions options;
   options.material.materials = {{"gel", 1e-3, 5000, 1, 0.2, 0.4}};
   options.quadratic = quadratic;
-  return solid_model(test::box_tetrahedra(nx, ny, nz, quadratic ? 2 : 1), options, {});
+  return fem::solid_model(test::box_tetrahedra(nx, ny, nz, quadratic ? 2 : 1), options, {});
 }
 
-void hold_below(Model& model) {
-  for (Node& node : model.nodes)
+void hold_below(model::Model& model) {
+  for (model::Node& node : model.nodes)
     if (node.position.z == 0)
-      node.fixed = fixed_all;
+      node.fixed = model::fixed_all;
 }
 
 void prepare(Body& body) {
   hold_below(body.model);
-  const StiffnessMatrix matrix = stiffness_matrix(body.model);
-  body.factor = Factor(matrix, Context{}).data();
+  const linalg::StiffnessMatrix matrix = fem::stiffness_matrix(body.model);
+  body.factor = linalg::Factor(matrix, Context{}).data();
   std::vector<std::uint32_t> nodes;
   for (std::uint32_t i = 0; nodes.size() < patch; ++i)
-    if (body.model.nodes[i].fixed == fixed_none)
+    if (body.model.nodes[i].fixed == model::fixed_none)
       nodes.push_back(i);
   const bool net = body.model.tetrahedra.empty();
   const auto source = [&] {
-    return compliance_of_store(memory_stiffness(matrix, body.factor, nodes, false,
-                                                net ? SIZE_MAX : surface_count(body.model)));
+    return compliance::compliance_of_store(memory_stiffness(
+        matrix, body.factor, nodes, false, net ? SIZE_MAX : model::surface_count(body.model)));
   };
-  body.object = std::make_unique<Elastostatic>(body.model, source(), with_threads(1));
+  body.object = std::make_unique<statics::Elastostatic>(body.model, source(), with_threads(1));
   if (!net)
-    body.turning = std::make_unique<WarpedStatics>(body.model, source(), with_threads(1));
+    body.turning = std::make_unique<statics::WarpedStatics>(body.model, source(), with_threads(1));
   for (std::size_t k = 0; k < contacts; ++k)
     body.load.displacement[nodes[2 * k]] = {};
 }
 
-void move_all(Load& load, std::mt19937& random) {
+void move_all(contact::Load& load, std::mt19937& random) {
   std::normal_distribution<double> normal(0, 0.01);
   for (auto& [node, d] : load.displacement)
     d = {normal(random), normal(random), normal(random)};
@@ -85,8 +86,8 @@ void move_all(Load& load, std::mt19937& random) {
 int main() {
   std::puts("stage,program,surface,inside,median_ms,fastest_ms,slowest_ms,over_net");
   std::vector<Body> bodies;
-  const Model cube = solid_box(24, 24, 24);
-  bodies.push_back({"net", build_model(surface_mesh(cube), {}, Context{}).model});
+  const model::Model cube = solid_box(24, 24, 24);
+  bodies.push_back({"net", model::build_model(model::surface_mesh(cube), {}, Context{}).model});
   bodies.push_back({"solid, much inside", cube});
   bodies.push_back({"solid, little inside", solid_box(40, 40, 2)});
   bodies.push_back({"solid, quadratic", solid_box(12, 12, 12, true)});
@@ -109,7 +110,7 @@ int main() {
   std::uint64_t rounds = 0, updates = 0;
   for (int step = -40; step < 400; ++step)
     for (Body& body : bodies) {
-      Load far = body.load;
+      contact::Load far = body.load;
       for (auto& [node, d] : far.displacement)
         d = {1 + 0.001 * step, 0, 1.5 + 0.002 * step};
       const auto time = [&](std::vector<double>& to, auto& object) {
@@ -138,7 +139,7 @@ int main() {
     const double net = times_of(bodies[0].*times).median;
     for (const Body& body : bodies) {
       const Times t = times_of(body.*times);
-      const std::size_t surface = surface_count(body.model);
+      const std::size_t surface = model::surface_count(body.model);
       std::printf("%s,\"%s\",%zu,%zu,%.4f,%.4f,%.4f,%.3f\n", stage, body.name.c_str(), surface,
                   body.model.nodes.size() - surface, t.median, t.fastest, t.slowest,
                   t.median / net);

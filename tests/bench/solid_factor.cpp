@@ -64,8 +64,9 @@ std::vector<double> some_load(std::size_t rows) {
   return f;
 }
 
-double error_of(const StiffnessMatrix& matrix, const std::vector<double>& x) {
-  return backward_error(matrix, stiffness_norm(matrix), x, some_load(matrix.order()));
+double error_of(const linalg::StiffnessMatrix& matrix, const std::vector<double>& x) {
+  return linalg::backward_error(matrix, linalg::stiffness_norm(matrix), x,
+                                some_load(matrix.order()));
 }
 
 /// In a process of its own, whose memory above that of one that does nothing is told. The threads
@@ -98,9 +99,9 @@ std::optional<Measured> apart(const std::function<Measured()>& work) {
   return m;
 }
 
-Measured ours(const StiffnessMatrix& matrix, int threads) {
+Measured ours(const linalg::StiffnessMatrix& matrix, int threads) {
   Measured m;
-  std::optional<Factor> factor;
+  std::optional<linalg::Factor> factor;
   const double all = one_time([&] { factor.emplace(matrix, with_threads(threads)); }, threads);
   m.factor = one_time([&] { factor->refactor(matrix, with_threads(threads)); }, threads);
   m.order = std::max(all - m.factor, 0.0);
@@ -112,7 +113,7 @@ Measured ours(const StiffnessMatrix& matrix, int threads) {
   return m;
 }
 
-Measured cholmod(const StiffnessMatrix& matrix, int threads) {
+Measured cholmod(const linalg::StiffnessMatrix& matrix, int threads) {
   Measured m;
   CholmodPeer peer(matrix, true);
   m.order = one_time([&] { peer.order(); }, threads);
@@ -136,7 +137,7 @@ void set_blas_threads(int threads) {
     set(threads);
 }
 
-void write_matrix(const std::string& path, const StiffnessMatrix& matrix) {
+void write_matrix(const std::string& path, const linalg::StiffnessMatrix& matrix) {
   std::ofstream file(path, std::ios::binary);
   const auto put = [&](const auto& list) {
     file.write(reinterpret_cast<const char*>(list.data()),
@@ -159,27 +160,28 @@ std::optional<Measured> pardiso(const std::string& path, int threads) {
 }
 
 /// Some of the spleen's nodes are held at its end.
-Model spleen(const std::string& surface, const std::string& programs, double cell,
-             const std::string& folder) {
+model::Model spleen(const std::string& surface, const std::string& programs, double cell,
+                    const std::string& folder) {
   const std::string path = folder + "/spleen.ela";
   const std::string call =
       "'" + programs + "/exp2ela' -q --material liver --unit m --solid --cell " +
       std::to_string(cell) + " --fix 'x<56.5' '" + surface + "' -o '" + path + "'";
   if (std::system(call.c_str()) != 0)
     throw Error(surface, "is not filled by exp2ela");
-  Input input(path);
-  return read_ela(input, with_threads(1));
+  formats::Input input(path);
+  return formats::read_ela(input, with_threads(1));
 }
 
-Model box(std::size_t tetrahedra) {
+model::Model box(std::size_t tetrahedra) {
   const auto side =
       static_cast<std::uint32_t>(std::cbrt(static_cast<double>(tetrahedra) / 6)); // per cube
-  SolidModelOptions options;
+  fem::SolidModelOptions options;
   options.material.materials = {{"gel", 1e-3, 5000, 1, 0.2, 0.45}};
-  Model model = solid_model(test::box_tetrahedra(side, side, side), options, with_threads(1));
-  for (Node& node : model.nodes)
+  model::Model model =
+      fem::solid_model(test::box_tetrahedra(side, side, side), options, with_threads(1));
+  for (model::Node& node : model.nodes)
     if (node.position.z == 0)
-      node.fixed = fixed_all;
+      node.fixed = model::fixed_all;
   return model;
 }
 
@@ -190,8 +192,8 @@ struct Size {
   int runs;
 };
 
-void bench(const Size& size, const Model& model, const std::string& folder) {
-  const StiffnessMatrix matrix = stiffness_matrix(model, {}, with_threads(1));
+void bench(const Size& size, const model::Model& model, const std::string& folder) {
+  const linalg::StiffnessMatrix matrix = fem::stiffness_matrix(model, {}, with_threads(1));
   const std::string path = folder + "/matrix";
   write_matrix(path, matrix);
   struct Line {

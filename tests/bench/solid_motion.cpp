@@ -37,8 +37,8 @@ constexpr int fall = 60; // steps, then from rest again
 
 struct Beam {
   std::string name;
-  TetMesh mesh;
-  std::vector<SolidMaterial> materials{{5e4, 0.45, 1e-3}};
+  tetrahedra::TetMesh mesh;
+  std::vector<fem::SolidMaterial> materials{{5e4, 0.45, 1e-3}};
   std::vector<std::uint8_t> held{};
   Numbers load{};
 
@@ -50,20 +50,20 @@ Beam beam(bool quadratic) {
                                                  ? test::box_tetrahedra(24, 6, 6, 100.0 / 24)
                                                  : test::box_tetrahedra(52, 13, 13, 100.0 / 52)};
   if (quadratic)
-    make_quadratic(b.mesh);
+    tetrahedra::make_quadratic(b.mesh);
   for (const Vec3& p : b.mesh.points)
     b.held.insert(b.held.end(), 3, p.x == 0 ? 1 : 0);
   b.load.resize(b.axes());
-  const Numbers masses = solid_masses(b.mesh, b.materials);
+  const Numbers masses = fem::solid_masses(b.mesh, b.materials);
   for (std::size_t i = 0; i < masses.size(); ++i)
     b.load[3 * i + 2] = -9810 * masses[i];
   return b;
 }
 
-SolidMotion moving(const Beam& b, bool reference, const Context& context) {
-  SolidMotionOptions options;
+integrator::SolidMotion moving(const Beam& b, bool reference, const Context& context) {
+  integrator::SolidMotionOptions options;
   options.reference = reference;
-  SolidMotion body(b.mesh, b.materials, options, context);
+  integrator::SolidMotion body(b.mesh, b.materials, options, context);
   body.hold(b.held);
   body.set_load(b.load);
   return body;
@@ -102,7 +102,7 @@ struct StepMeans {
 
 StepMeans time_steps(const Beam& b, int threads, int steps, int compared) {
   const Context context = with_threads(threads);
-  SolidMotion body = moving(b, false, context), newton = moving(b, true, context);
+  integrator::SolidMotion body = moving(b, false, context), newton = moving(b, true, context);
   (void)body.step(h, context); // makes the factor
   Numbers times, rounds, evaluations, errors;
   for (int n = 0; n < steps; ++n) {
@@ -110,7 +110,7 @@ StepMeans time_steps(const Beam& b, int threads, int steps, int compared) {
       body.set_state(Numbers(b.axes()), Numbers(b.axes()), context);
     const Numbers before = body.displacement(),
                   speed(body.velocity().begin(), body.velocity().end());
-    SolidStep step;
+    integrator::SolidStep step;
     times.push_back(milliseconds([&] { step = body.step(h, context); }));
     rounds.push_back(step.rounds);
     evaluations.push_back(step.evaluations);
@@ -130,17 +130,17 @@ StepMeans time_steps(const Beam& b, int threads, int steps, int compared) {
 
 void time_parts(const Beam& b, int threads, int runs, const StepMeans& step) {
   const Context context = with_threads(threads);
-  const std::vector<SolidElement> elements = solid_elements(b.mesh, b.materials, context);
-  CorotationalSolid solid(b.mesh, elements, {false, false});
+  const std::vector<fem::SolidElement> elements = fem::solid_elements(b.mesh, b.materials, context);
+  fem::CorotationalSolid solid(b.mesh, elements, {false, false});
   Numbers x, forces(b.axes()), rotations(3 * b.axes());
   for (const Vec3& p : b.mesh.points) // bent somewhat
     x.insert(x.end(), {p.x, p.y, p.z - 2e-3 * p.x * p.x});
-  StiffnessMatrix matrix = solid_stiffness(b.mesh, elements, b.held, context);
-  const Numbers masses = solid_masses(b.mesh, b.materials);
+  linalg::StiffnessMatrix matrix = fem::solid_stiffness(b.mesh, elements, b.held, context);
+  const Numbers masses = fem::solid_masses(b.mesh, b.materials);
   for (std::size_t c = 0; c < matrix.order(); ++c)
     matrix.value[static_cast<std::size_t>(matrix.column_start[c])] +=
         masses[static_cast<std::size_t>(matrix.axis_of_row[c]) / 3] / (h * h);
-  SingleFactor factor{Factor(matrix, context)};
+  linalg::SingleFactor factor{linalg::Factor(matrix, context)};
   Numbers rows(matrix.order()), forced, solved, turned;
   for (int run = -3; run < runs; ++run) {
     const auto time = [&](Numbers& to, const auto& work) {

@@ -40,7 +40,7 @@ constexpr int looks = 4;
 constexpr double young = 5e4, poisson = 0.45;
 
 struct Beam {
-  TetMesh mesh;
+  tetrahedra::TetMesh mesh;
   std::vector<std::uint64_t> held;
 };
 
@@ -57,11 +57,11 @@ struct Run {
   std::vector<double> heights; ///< of the end, in mm
 };
 
-Run ours(const Beam& beam, SolidLaw law, int steps) {
-  const std::vector<SolidMaterial> materials{{young, poisson, 1e-3}};
-  SolidMotionOptions options;
+Run ours(const Beam& beam, integrator::SolidLaw law, int steps) {
+  const std::vector<fem::SolidMaterial> materials{{young, poisson, 1e-3}};
+  integrator::SolidMotionOptions options;
   options.law = law;
-  SolidMotion moving(beam.mesh, materials, options, with_threads(1));
+  integrator::SolidMotion moving(beam.mesh, materials, options, with_threads(1));
   const std::size_t axes = 3 * beam.mesh.points.size();
   std::vector<std::uint8_t> held(axes);
   for (const std::uint64_t node : beam.held)
@@ -170,9 +170,9 @@ int main() {
     const Beam body = beam(across);
     write(body, path);
     show("gewebe", body, std::array{12, 40, 100, 400, 1600, 6400},
-         [&](int steps) { return ours(body, SolidLaw::corotational, steps); });
+         [&](int steps) { return ours(body, integrator::SolidLaw::corotational, steps); });
     show("gewebe Neo-Hookean", body, std::array{12, 40, 100, 400, 3200},
-         [&](int steps) { return ours(body, SolidLaw::hyperelastic, steps); });
+         [&](int steps) { return ours(body, integrator::SolidLaw::hyperelastic, steps); });
     show("mujoco discrete", body, std::array{12, 40, 100, 400, 3200},
          [&](int steps) { return mujoco(path, "discrete", steps); });
     show("mujoco Euler", body, std::array{400, 800, 1600, 6400},

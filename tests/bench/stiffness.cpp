@@ -59,7 +59,7 @@ double product_rate() {
 }
 
 /// Columns that stay in memory.
-class Kept final : public ColumnSink {
+class Kept final : public columns::ColumnSink {
 public:
   void write(std::size_t, std::span<const double> columns, double) override {
     all.insert(all.end(), columns.begin(), columns.end());
@@ -68,7 +68,7 @@ public:
 };
 
 /// Columns that go nowhere, but for the last of which the first number is kept.
-class Nowhere final : public ColumnSink {
+class Nowhere final : public columns::ColumnSink {
 public:
   void write(std::size_t, std::span<const double> columns, double) override { sum += columns[0]; }
   double sum = 0;
@@ -77,7 +77,7 @@ public:
 /// CHOLMOD's factor and its solve for blocks of identity columns.
 class Peer {
 public:
-  explicit Peer(const StiffnessMatrix& matrix) {
+  explicit Peer(const linalg::StiffnessMatrix& matrix) {
     (void)cholmod_l_start(&common_);
     common_.print = 0;
     common_.supernodal = CHOLMOD_SUPERNODAL;
@@ -113,14 +113,14 @@ private:
   cholmod_factor* factor_ = nullptr;
 };
 
-void bench_columns(const Model& model, double rate) {
-  const StiffnessMatrix matrix = stiffness_matrix(model);
+void bench_columns(const model::Model& model, double rate) {
+  const linalg::StiffnessMatrix matrix = fem::stiffness_matrix(model);
   const std::size_t n = model.nodes.size();
-  std::optional<Factor> factor;
+  std::optional<linalg::Factor> factor;
   const Times factorising = measure([&] { factor.emplace(matrix, with_threads(1)); }, 3);
   report("factor", "ffe-precompute", n, 0, 1, factorising,
          static_cast<double>(factor->entries()) * 8e-6, "MB");
-  const double norm = stiffness_norm(matrix);
+  const double norm = linalg::stiffness_norm(matrix);
   std::vector<std::uint32_t> nodes; // every eighth: neighbours in the file are so in the model
   for (std::uint32_t node = 0; node < n; ++node)
     if (node / 8 % 8 == 0)
@@ -132,7 +132,8 @@ void bench_columns(const Model& model, double rate) {
     Nowhere nowhere;
     const Times times = measure(
         [&] {
-          (void)compliance_columns(matrix, *factor, norm, nodes, with_threads(threads), nowhere);
+          (void)columns::compliance_columns(matrix, *factor, norm, nodes, with_threads(threads),
+                                            nowhere);
         },
         3);
     report("columns", "ffe-precompute", n, 3 * nodes.size(), threads, times,
@@ -163,27 +164,31 @@ void bench_columns(const Model& model, double rate) {
 
 /// Relaxed columns of one node, one thread: their largest error over the largest number of the
 /// direct ones, against the time of one column; and how much longer that is than a direct one.
-void bench_relaxation(const char* name, const Model& model, bool many) {
-  const StiffnessMatrix matrix = stiffness_matrix(model);
-  const Factor factor(matrix, with_threads(1));
-  const double norm = stiffness_norm(matrix);
+void bench_relaxation(const char* name, const model::Model& model, bool many) {
+  const linalg::StiffnessMatrix matrix = fem::stiffness_matrix(model);
+  const linalg::Factor factor(matrix, with_threads(1));
+  const double norm = linalg::stiffness_norm(matrix);
   const std::size_t n = model.nodes.size();
   const std::uint32_t node[] = {static_cast<std::uint32_t>(n / 3)};
   Kept exact;
-  (void)compliance_columns(matrix, factor, norm, node, with_threads(1), exact);
+  (void)columns::compliance_columns(matrix, factor, norm, node, with_threads(1), exact);
   std::vector<std::uint32_t> nodes;
   for (std::uint32_t i = 0; i < std::min<std::size_t>(n, 512); ++i)
     nodes.push_back(i);
   Nowhere nowhere;
   const Times direct = measure(
-      [&] { (void)compliance_columns(matrix, factor, norm, nodes, with_threads(1), nowhere); }, 3);
+      [&] {
+        (void)columns::compliance_columns(matrix, factor, norm, nodes, with_threads(1), nowhere);
+      },
+      3);
   const double column = direct.median / static_cast<double>(3 * nodes.size());
-  const auto relax = [&](const char* program, const RelaxOptions& options) {
+  const auto relax = [&](const char* program, const dynamics::RelaxOptions& options) {
     Kept found;
     const Times times = measure(
         [&] {
           found.all.clear();
-          (void)relaxed_columns(model, matrix, factor, norm, node, options, with_threads(1), found);
+          (void)dynamics::relaxed_columns(model, matrix, factor, norm, node, options,
+                                          with_threads(1), found);
         },
         1);
     double error = 0, largest = 0;
@@ -209,8 +214,8 @@ void bench_relaxation(const char* name, const Model& model, bool many) {
     relax((std::to_string(steps) + " steps").c_str(), {.steps = steps});
 }
 
-Model model_of(const TriangleMesh& mesh) {
-  return build_model(mesh, {}, Context{}).model;
+model::Model model_of(const TriangleMesh& mesh) {
+  return model::build_model(mesh, {}, Context{}).model;
 }
 
 } // namespace

@@ -29,6 +29,7 @@
 #include <vector>
 
 using namespace gewebe;
+using namespace gewebe::test;
 using namespace gewebe::timing;
 
 namespace {
@@ -41,17 +42,18 @@ void report(const char* stage, const std::string& program, std::size_t nodes, st
 }
 
 /// A ball cut into rings, of some `nodes` nodes.
-Model ball(std::size_t nodes) {
+model::Model ball(std::size_t nodes) {
   const auto rings = static_cast<std::size_t>(std::sqrt(static_cast<double>(nodes) / 2));
-  BuildOptions options;
+  model::BuildOptions options;
   options.centrals = 4;
-  return build_model(primitive_mesh(parse_primitive(
-                         "sphere:" + std::to_string(2 * rings) + "x" + std::to_string(rings), "")),
-                     options, Context{})
+  return model::build_model(
+             model::primitive_mesh(model::parse_primitive(
+                 "sphere:" + std::to_string(2 * rings) + "x" + std::to_string(rings), "")),
+             options, Context{})
       .model;
 }
 
-std::vector<std::uint32_t> all_nodes(const Model& model, bool wanted) {
+std::vector<std::uint32_t> all_nodes(const model::Model& model, bool wanted) {
   std::vector<std::uint32_t> nodes(wanted ? model.nodes.size() : 0);
   for (std::size_t i = 0; i < nodes.size(); ++i)
     nodes[i] = static_cast<std::uint32_t>(i);
@@ -64,20 +66,22 @@ struct Made {
 };
 
 /// A store of equal objects in a file of its own.
-Made make_store(const Model& model, std::size_t objects, bool columns, bool single, int threads) {
+Made make_store(const model::Model& model, std::size_t objects, bool columns, bool single,
+                int threads) {
   const ScratchFile file(".h5");
   Made made;
   {
-    Output output(file.path(), {});
-    StiffnessStoreWriter writer(output);
+    formats::Output output(file.path(), {});
+    formats::StiffnessStoreWriter writer(output);
     for (std::size_t k = 0; k < objects; ++k) {
-      const StiffnessMatrix matrix = stiffness_matrix(model);
-      StiffnessCheck check;
-      const Factor factor = checked_factor(model, matrix, with_threads(threads), check);
-      StiffnessFacts facts;
+      const linalg::StiffnessMatrix matrix = fem::stiffness_matrix(model);
+      linalg::StiffnessCheck check;
+      const linalg::Factor factor =
+          linalg::checked_factor(model, matrix, with_threads(threads), check);
+      formats::StiffnessFacts facts;
       facts.object = "ball" + std::to_string(k);
-      facts.hash = stiffness_hash(model);
-      facts.rest = rest_hash(model);
+      facts.hash = formats::stiffness_hash(model);
+      facts.rest = formats::rest_hash(model);
       facts.nodes = model.nodes.size();
       facts.order = matrix.order();
       facts.norm = check.norm;
@@ -85,7 +89,8 @@ Made make_store(const Model& model, std::size_t objects, bool columns, bool sing
       facts.single = single;
       const auto nodes = writer.begin(facts, matrix, factor, all_nodes(model, columns));
       made.columns += milliseconds([&] {
-        (void)compliance_columns(matrix, factor, check.norm, nodes, with_threads(threads), writer);
+        (void)columns::compliance_columns(matrix, factor, check.norm, nodes, with_threads(threads),
+                                          writer);
       });
       (void)writer.end(check.residual);
     }
@@ -100,7 +105,7 @@ Made make_store(const Model& model, std::size_t objects, bool columns, bool sing
 void bench_size() {
   const std::size_t nodes = 2000;
   for (const std::size_t k : std::initializer_list<std::size_t>{1, 2, 5, 10}) {
-    const Model model = ball(nodes / k);
+    const model::Model model = ball(nodes / k);
     const std::size_t n = k * model.nodes.size();
     const double expected = 72.0 * static_cast<double>(n * n) / static_cast<double>(k);
     const std::string program = std::to_string(k) + " objects";
@@ -117,7 +122,7 @@ void bench_size() {
     report("size of columns", program + " float32", n, 3 * n, 2, single, share(half, expected),
            "of 72 n^2/k");
   }
-  const Model organ = ball(10000);
+  const model::Model organ = ball(10000);
   Made made;
   const Times times = measure([&] { made = make_store(organ, 1, false, false, 1); }, 3);
   report("size of factor", "10000 nodes", organ.nodes.size(), 0, 1, times,
@@ -155,7 +160,7 @@ void bench_scaling() {
   std::vector<Times> all;
   for (const std::size_t nodes :
        std::initializer_list<std::size_t>{1000, 3000, 10000, 30000, 100000}) {
-    const Model model = ball(nodes);
+    const model::Model model = ball(nodes);
     const auto n = static_cast<double>(model.nodes.size());
     Made made;
     all.push_back(
@@ -176,7 +181,7 @@ void bench_scaling() {
 
 /// Columns into a file, and as many bytes from one block of memory.
 void bench_disk() {
-  const Model model = ball(4000);
+  const model::Model model = ball(4000);
   Made made;
   const Times times = measure([&] { made = make_store(model, 1, true, false, 2); }, 3);
   const double bytes = static_cast<double>(made.bytes);

@@ -65,7 +65,7 @@ namespace {
 
 struct Scene {
   std::string name;
-  Grid grid;
+  volume::Grid grid;
   double volume = 0; ///< mm³
   /// Of cells, each of 12 tetrahedra, of which so many fill it.
   double cell(double tetrahedra) const { return std::cbrt(12 * volume / tetrahedra); }
@@ -75,21 +75,22 @@ std::vector<Scene> make_scenes() {
   std::vector<Scene> result{{"metaballs", scenes::metaballs(64, 3), 0}};
   const std::string path = test::shared_folder() + "/data/sofa_liver_smooth.obj";
   if (std::filesystem::exists(path)) {
-    Input input(path);
-    MeshReadOptions options;
-    options.kind = Kind::obj;
+    formats::Input input(path);
+    formats::MeshReadOptions options;
+    options.kind = formats::Kind::obj;
     options.unit = "cm";
-    const TriangleMesh mesh = read_mesh(input, options);
-    CoverageReport report;
-    const std::optional<Grid> grid = exact_coverage(
-        {}, mesh, lattice_for_dim(bounding_box(mesh), 96), OpenMesh::refuse, &report);
+    const TriangleMesh mesh = formats::read_mesh(input, options);
+    antialiasing::CoverageReport report;
+    const std::optional<volume::Grid> grid =
+        antialiasing::exact_coverage({}, mesh, volume::lattice_for_dim(bounding_box(mesh), 96),
+                                     voxelization::OpenMesh::refuse, &report);
     if (grid)
       result.push_back({"liver", *grid, 0});
   } else {
     (void)std::fputs("stuffing: liver skipped, no such file\n", stderr);
   }
   for (Scene& scene : result)
-    scene.volume = signed_volume(marching_cubes({}, scene.grid).mesh);
+    scene.volume = signed_volume(surface::marching_cubes({}, scene.grid).mesh);
   return result;
 }
 
@@ -116,7 +117,7 @@ struct Run {
   double cell = 0; ///< mm
   Times times{};
   double mib = 0;
-  TetMesh mesh;
+  tetrahedra::TetMesh mesh;
 };
 
 void row(const std::string& stage, const Run& run, double first, double figure, const char* measure,
@@ -129,10 +130,11 @@ void row(const std::string& stage, const Run& run, double first, double figure, 
 
 void report(const Scene& scene, Run& run) {
   // Peers' files may hold points of no tetrahedron, and tetrahedra without volume.
-  (void)repair_tetrahedra(run.mesh);
-  const TetBoundary surface = boundary(run.mesh);
-  const TetQuality quality = tet_quality(run.mesh, surface);
-  const SurfaceDistance distance = surface_distance({}, scene.grid, {{}, run.cell}, surface.mesh);
+  (void)tetrahedra::repair_tetrahedra(run.mesh);
+  const tetrahedra::TetBoundary surface = tetrahedra::boundary(run.mesh);
+  const tetrahedra::TetQuality quality = tetrahedra::tet_quality(run.mesh, surface);
+  const stuffing::SurfaceDistance distance =
+      stuffing::surface_distance({}, scene.grid, {{}, run.cell}, surface.mesh);
   char rest[120];
   (void)std::snprintf(rest, sizeof rest, "%.4f,%.2f,%.2f,%.3f,%zu,%.0f",
                       distance.largest / run.cell, quality.smallest_angle, quality.largest_angle,
@@ -151,7 +153,9 @@ Times measure_some(const std::function<void()>& work) {
 
 Run ours(const Scene& scene, double cell, int threads) {
   Run run{"ours", threads, cell, {}, 0, {}};
-  const auto work = [&] { run.mesh = stuff(with_threads(threads), scene.grid, {{}, cell}); };
+  const auto work = [&] {
+    run.mesh = stuffing::stuff(with_threads(threads), scene.grid, {{}, cell});
+  };
   run.mib = peak_mib(work);
   run.times = measure_some(work);
   return run;
@@ -182,8 +186,8 @@ using Triangulation = CGAL::Mesh_triangulation_3<Domain>::type;
 using Complex = CGAL::Mesh_complex_3_in_triangulation_3<Triangulation>;
 using Criteria = CGAL::Mesh_criteria_3<Triangulation>;
 
-TetMesh from_cgal(const Complex& complex) {
-  TetMesh mesh;
+tetrahedra::TetMesh from_cgal(const Complex& complex) {
+  tetrahedra::TetMesh mesh;
   std::map<Triangulation::Vertex_handle, std::uint32_t> number;
   for (auto cell = complex.cells_in_complex_begin(); cell != complex.cells_in_complex_end();
        ++cell) {
@@ -207,9 +211,9 @@ struct Extent {
   double diagonal = 0;
 };
 
-Extent extent_of(const Grid& grid) {
-  Field field(grid);
-  const GridTransform& transform = grid.info().transform;
+Extent extent_of(const volume::Grid& grid) {
+  volume::Field field(grid);
+  const volume::GridTransform& transform = grid.info().transform;
   Int3 low{}, high{};
   (void)grid.active_box(low, high);
   Box3 box;
@@ -219,7 +223,7 @@ Extent extent_of(const Grid& grid) {
                                 static_cast<double>((corner & 4) != 0 ? high[2] : low[2])}));
   Extent extent{{}, norm(box.size())};
   std::optional<double> best;
-  for (const LeafView& leaf : grid.leaves()) {
+  for (const volume::LeafView& leaf : grid.leaves()) {
     const Vec3 index{leaf.origin[0] + 4.0, leaf.origin[1] + 4.0, leaf.origin[2] + 4.0};
     const double value = field.value(index);
     if (!best || value > *best) {
@@ -232,8 +236,8 @@ Extent extent_of(const Grid& grid) {
 
 void bench_cgal(const Scene& scene, const Run& reference) {
   namespace p = CGAL::parameters;
-  Field field(scene.grid);
-  const GridInfo& info = scene.grid.info();
+  volume::Field field(scene.grid);
+  const volume::GridInfo& info = scene.grid.info();
   const Extent extent = extent_of(scene.grid);
   const auto value = [&](const Kernel::Point_3& at) {
     return info.isovalue - field.value(info.transform.to_index({at.x(), at.y(), at.z()}));
@@ -279,10 +283,11 @@ void bench_cgal(const Scene& scene, const Run& reference) {
 
 /// Our surface at edges of about a cell, as OFF.
 void write_surface(const Scene& scene, double cell, const std::filesystem::path& path) {
-  SnapOptions options;
+  surface::SnapOptions options;
   options.epsilon = 0.5;
-  const Grid coarse = resample({}, scene.grid, uniform_transform(cell));
-  const TriangleMesh mesh = snap({}, marching_cubes_to_snap({}, coarse), options).mesh;
+  const volume::Grid coarse = volume::resample({}, scene.grid, volume::uniform_transform(cell));
+  const TriangleMesh mesh =
+      surface::snap({}, surface::marching_cubes_to_snap({}, coarse), options).mesh;
   std::ofstream file(path);
   file.precision(17);
   file << "OFF\n" << mesh.points.size() << " " << mesh.triangles.size() << " 0\n";
@@ -316,11 +321,11 @@ Shell shell(const std::string& command, const std::filesystem::path& log) {
   return result;
 }
 
-TetMesh read_tetrahedra(const std::filesystem::path& path, Kind kind) {
-  Input input(path.string());
-  TetReadOptions options;
+tetrahedra::TetMesh read_tetrahedra(const std::filesystem::path& path, formats::Kind kind) {
+  formats::Input input(path.string());
+  formats::TetReadOptions options;
   options.kind = kind;
-  return read_tet_mesh(input, options);
+  return formats::read_tet_mesh(input, options);
 }
 
 bool near(const Run& run, const Run& reference) {
@@ -361,7 +366,7 @@ void bench_tetgen(const Scene& scene, const Run& reference, const std::filesyste
                          scene.name.c_str());
       return;
     }
-    run.mesh = read_tetrahedra(folder / "surface.1.node", Kind::tetgen);
+    run.mesh = read_tetrahedra(folder / "surface.1.node", formats::Kind::tetgen);
     if (near(run, reference))
       break;
     largest *= static_cast<double>(run.mesh.tetrahedra.size()) / wanted;
@@ -388,7 +393,7 @@ void bench_ftetwild(const Scene& scene, const Run& reference, const std::filesys
     }
     run.times = times_of({figures[0]});
     run.mib = figures[1];
-    run.mesh = read_tetrahedra(folder / "ftetwild.mesh", Kind::medit);
+    run.mesh = read_tetrahedra(folder / "ftetwild.mesh", formats::Kind::medit);
     if (near(run, reference))
       break;
     edge *= std::cbrt(static_cast<double>(run.mesh.tetrahedra.size()) /

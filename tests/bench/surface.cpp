@@ -46,8 +46,8 @@ void report(const std::string& stage, const char* program, double voxel, double 
 }
 
 /// Adds up all values of the leaves: what any method that looks at each once must pay.
-Times measure_reading(const Grid& grid, int threads) {
-  const std::vector<LeafView> leaves = grid.leaves();
+Times measure_reading(const volume::Grid& grid, int threads) {
+  const std::vector<volume::LeafView> leaves = grid.leaves();
   std::atomic<std::uint32_t> kept{0};
   return measure([&] {
     parallel_blocks(
@@ -55,7 +55,7 @@ Times measure_reading(const Grid& grid, int threads) {
           std::array<std::uint32_t, 16> sums{};
           for (std::size_t n = begin; n < end; ++n) {
             const auto* const words = reinterpret_cast<const std::uint32_t*>(leaves[n].values);
-            for (std::size_t v = 0; v < leaf_voxels; v += sums.size())
+            for (std::size_t v = 0; v < volume::leaf_voxels; v += sums.size())
               for (std::size_t lane = 0; lane < sums.size(); ++lane)
                 sums[lane] ^= words[v + lane];
           }
@@ -66,11 +66,11 @@ Times measure_reading(const Grid& grid, int threads) {
 }
 
 /// The first n voxels of each axis from `low` on, x fastest, as VTK wants them.
-void write_dense(const Grid& grid, const Int3& low, int n, const std::string& path) {
+void write_dense(const volume::Grid& grid, const Int3& low, int n, const std::string& path) {
   std::vector<float> values(static_cast<std::size_t>(n) * static_cast<std::size_t>(n) *
                             static_cast<std::size_t>(n));
   parallel_blocks({}, static_cast<std::size_t>(n), 8, [&](std::size_t begin, std::size_t end) {
-    GridAccessor accessor(grid);
+    volume::GridAccessor accessor(grid);
     for (int i = 0; i < n; ++i) // one 8-voxel layer of k at a time: leaf by leaf
       for (int j = 0; j < n; ++j)
         for (auto k = static_cast<int>(begin); k < static_cast<int>(end); ++k)
@@ -85,8 +85,8 @@ void write_dense(const Grid& grid, const Int3& low, int n, const std::string& pa
              static_cast<std::streamsize>(values.size() * sizeof(float)));
 }
 
-void bench_vtk(const std::string& stage, const Grid& grid, double isovalue, const Int3& low, int n,
-               double voxel, const std::array<double, 2>& ours) {
+void bench_vtk(const std::string& stage, const volume::Grid& grid, double isovalue, const Int3& low,
+               int n, double voxel, const std::array<double, 2>& ours) {
   const std::string path =
       (std::filesystem::temp_directory_path() / ("surface-" + std::to_string(getpid()))).string();
   write_dense(grid, low, n, path);
@@ -108,9 +108,9 @@ void bench_vtk(const std::string& stage, const Grid& grid, double isovalue, cons
   std::filesystem::remove(path);
 }
 
-void bench_scene(const std::string& stage, const Grid& grid, const Int3& low, int n) {
+void bench_scene(const std::string& stage, const volume::Grid& grid, const Int3& low, int n) {
   const double voxel = grid.info().transform.voxel_size().x;
-  const double isovalue = default_isovalue(grid.info());
+  const double isovalue = surface::default_isovalue(grid.info());
   std::array<double, 2> ours{}, snaps{}, boths{};
   for (const int threads : {1, 2}) {
     const auto slot = static_cast<std::size_t>(threads) - 1;
@@ -120,11 +120,14 @@ void bench_scene(const std::string& stage, const Grid& grid, const Int3& low, in
     std::vector<double> meshing_times, snapping_times, both_times;
     double points = 0, points_left = 0, cells = 0;
     for (int run = 0; run < runs; ++run) {
-      IsoSurface surface, to_snap; // memory is given back outside the measurement
-      SnapResult snapped;
-      meshing_times.push_back(milliseconds([&] { surface = marching_cubes(context, grid); }));
-      const double before = milliseconds([&] { to_snap = marching_cubes_to_snap(context, grid); });
-      snapping_times.push_back(milliseconds([&] { snapped = snap(context, to_snap, {}); }));
+      surface::IsoSurface surface, to_snap; // memory is given back outside the measurement
+      surface::SnapResult snapped;
+      meshing_times.push_back(
+          milliseconds([&] { surface = surface::marching_cubes(context, grid); }));
+      const double before =
+          milliseconds([&] { to_snap = surface::marching_cubes_to_snap(context, grid); });
+      snapping_times.push_back(
+          milliseconds([&] { snapped = surface::snap(context, to_snap, {}); }));
       both_times.push_back(before + snapping_times.back());
       points = static_cast<double>(surface.mesh.points.size());
       points_left = static_cast<double>(snapped.mesh.points.size());
@@ -169,7 +172,7 @@ void bench_scene(const std::string& stage, const Grid& grid, const Int3& low, in
 }
 
 /// Balls of support R(1 ± 0.25) in a cube of 100 mm.
-Grid metaballs(int count, double R, int n) {
+volume::Grid metaballs(int count, double R, int n) {
   std::mt19937 random(1);
   std::uniform_real_distribution<double> unit(0, 1);
   Particles particles;
@@ -179,14 +182,14 @@ Grid metaballs(int count, double R, int n) {
     const double x = place(), y = place(), z = place();
     particles.push_back({{x, y, z}, support, 1});
   }
-  DensityOptions options;
-  options.info.transform = uniform_transform(100.0 / n);
+  density::DensityOptions options;
+  options.info.transform = volume::uniform_transform(100.0 / n);
   options.band = 0.5;
-  return metaball_density({}, particles, options);
+  return density::metaball_density({}, particles, options);
 }
 
 /// A ball of fluid: particles about a cubic lattice of unit distance; n voxels across.
-Grid fluid(int count, int n, bool band) {
+volume::Grid fluid(int count, int n, bool band) {
   std::mt19937 random(1);
   std::uniform_real_distribution<double> unit(-0.2, 0.2);
   const double radius = std::cbrt(count * 3 / (4 * 3.14159265358979));
@@ -199,28 +202,28 @@ Grid fluid(int count, int n, bool band) {
           const double x = i + unit(random), y = j + unit(random), z = k + unit(random);
           particles.push_back({{x, y, z}, 1.2, 1});
         }
-  DensityOptions options;
-  options.info.transform = uniform_transform(support_box(particles).longest_side() / n);
+  density::DensityOptions options;
+  options.info.transform = volume::uniform_transform(support_box(particles).longest_side() / n);
   if (band)
     options.band = 0.5;
-  return metaball_density({}, particles, options);
+  return density::metaball_density({}, particles, options);
 }
 
 /// 0.5 + gyroid of the given period, in all n³ voxels.
-Grid gyroid(int n, double period) {
+volume::Grid gyroid(int n, double period) {
   std::vector<double> sine, cosine;
   for (int i = 0; i < n; ++i) {
     sine.push_back(std::sin(2 * 3.14159265358979 * i / period));
     cosine.push_back(std::cos(2 * 3.14159265358979 * i / period));
   }
   std::vector<Int3> origins;
-  for (int i = 0; i < n; i += leaf_dim)
-    for (int j = 0; j < n; j += leaf_dim)
-      for (int k = 0; k < n; k += leaf_dim)
+  for (int i = 0; i < n; i += volume::leaf_dim)
+    for (int j = 0; j < n; j += volume::leaf_dim)
+      for (int k = 0; k < n; k += volume::leaf_dim)
         origins.push_back({i, j, k});
-  GridBuilder builder{GridInfo{}};
-  for (const LeafRef& leaf : builder.add_leaves({}, origins))
-    for (int v = 0; v < leaf_voxels; ++v) {
+  volume::GridBuilder builder{volume::GridInfo{}};
+  for (const volume::LeafRef& leaf : builder.add_leaves({}, origins))
+    for (int v = 0; v < volume::leaf_voxels; ++v) {
       const auto i = static_cast<std::size_t>(leaf.origin[0] + (v >> 6)),
                  j = static_cast<std::size_t>(leaf.origin[1] + (v >> 3 & 7)),
                  k = static_cast<std::size_t>(leaf.origin[2] + (v & 7));

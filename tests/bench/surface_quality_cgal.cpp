@@ -87,7 +87,7 @@ TriangleMesh from_cgal(const Surface& surface) {
 
 struct Scene {
   std::string name;
-  Grid grid;
+  volume::Grid grid;
   std::function<double(const Vec3&)> distance; // mm, from the true surface
   double voxel() const { return grid.info().transform.voxel_size().x; }
 };
@@ -142,14 +142,15 @@ std::vector<Scene> make_scenes() {
       (void)std::fprintf(stderr, "surface quality: %s skipped, no such file\n", organ.name);
       continue;
     }
-    Input input(path);
-    MeshReadOptions options;
-    options.kind = path.ends_with("obj") ? Kind::obj : Kind::stl;
+    formats::Input input(path);
+    formats::MeshReadOptions options;
+    options.kind = path.ends_with("obj") ? formats::Kind::obj : formats::Kind::stl;
     options.unit = organ.unit;
-    const TriangleMesh mesh = read_mesh(input, options);
-    CoverageReport report;
-    std::optional<Grid> grid = exact_coverage(
-        {}, mesh, lattice_for_dim(bounding_box(mesh), organ.dim), OpenMesh::refuse, &report);
+    const TriangleMesh mesh = formats::read_mesh(input, options);
+    antialiasing::CoverageReport report;
+    std::optional<volume::Grid> grid = antialiasing::exact_coverage(
+        {}, mesh, volume::lattice_for_dim(bounding_box(mesh), organ.dim),
+        voxelization::OpenMesh::refuse, &report);
     if (grid)
       result.push_back({organ.name, *grid, distance_to_mesh(mesh)});
   }
@@ -174,8 +175,8 @@ void report(const Scene& scene, const std::string& program, int threads, const T
   for (const auto& [a, b, c] : mesh.triangles)
     centroids.add(scene.distance((mesh.points[a] + mesh.points[b] + mesh.points[c]) / 3) /
                   scene.voxel());
-  const MeshReport shape = examine_mesh(mesh);
-  const MeshQuality quality = mesh_quality(mesh);
+  const mesh::MeshReport shape = mesh::examine_mesh(mesh);
+  const mesh::MeshQuality quality = mesh::mesh_quality(mesh);
   std::printf("surface quality of %s,%s,%g,%zu,%d,%.3f,%.3f,%.3f,%.5f,mean distance of points "
               "(voxels),%.4f,%.5f,%.4f,%zu,%.3f,%.2f,%.5f,%.1f,%.4f,%llu,%llu\n",
               scene.name.c_str(), program.c_str(), scene.voxel(), mesh.triangles.size(), threads,
@@ -186,30 +187,31 @@ void report(const Scene& scene, const std::string& program, int threads, const T
               quality.share_below_10, quality.edge_ratio,
               quality.explicit_step / std::sqrt(scene.voxel()),
               static_cast<unsigned long long>(shape.zero_area_faces),
-              static_cast<unsigned long long>(self_intersections({}, mesh).pairs));
+              static_cast<unsigned long long>(mesh::self_intersections({}, mesh).pairs));
   (void)std::fflush(stdout);
 }
 
 // ---- ours
 
 void bench_ours(const Scene& scene) {
-  for (const auto place : {SnapOptions::Place::mean, SnapOptions::Place::corner})
+  for (const auto place : {surface::SnapOptions::Place::mean, surface::SnapOptions::Place::corner})
     for (const double epsilon : {0.0, 0.05, 0.15, 0.25, 0.35, 0.5})
       for (const int rounds : {0, 3, 10}) {
-        if (place == SnapOptions::Place::corner && (rounds > 0 || epsilon == 0))
+        if (place == surface::SnapOptions::Place::corner && (rounds > 0 || epsilon == 0))
           continue;
         if (rounds > 0 && epsilon != 0 && epsilon != 0.15 && epsilon != 0.5)
           continue;
         TriangleMesh mesh;
         const Times times = measure(
             [&] {
-              mesh = snap({}, marching_cubes({}, scene.grid), {epsilon, place}).mesh;
-              regularize({}, scene.grid, scene.grid.info().isovalue, mesh, {rounds});
+              mesh =
+                  surface::snap({}, surface::marching_cubes({}, scene.grid), {epsilon, place}).mesh;
+              surface::regularize({}, scene.grid, scene.grid.info().isovalue, mesh, {rounds});
             },
             runs);
         char name[80];
         std::snprintf(name, sizeof name, "epsilon %g%s%s", epsilon,
-                      place == SnapOptions::Place::corner ? " corner" : "",
+                      place == surface::SnapOptions::Place::corner ? " corner" : "",
                       rounds > 0 ? (" regularize " + std::to_string(rounds)).c_str() : "");
         report(scene, name, thread_count({}), times, mesh);
       }
@@ -218,8 +220,8 @@ void bench_ours(const Scene& scene) {
 // ---- peers
 
 void bench_cgal(const Scene& scene) {
-  const IsoSurface surface = marching_cubes({}, scene.grid);
-  const double edge = examine_mesh(snap({}, surface, {0.5}).mesh).edge_mean;
+  const surface::IsoSurface surface = surface::marching_cubes({}, scene.grid);
+  const double edge = mesh::examine_mesh(surface::snap({}, surface, {0.5}).mesh).edge_mean;
   TriangleMesh mesh;
   const Times times = measure(
       [&] {
@@ -239,7 +241,7 @@ struct Dense {
   std::vector<float> values;
 };
 
-Dense dense(const Grid& grid) {
+Dense dense(const volume::Grid& grid) {
   Dense result;
   Int3 max{};
   grid.active_box(result.min, max);
@@ -250,7 +252,7 @@ Dense dense(const Grid& grid) {
     count *= static_cast<std::size_t>(result.size[a]);
   }
   result.values.reserve(count);
-  GridAccessor values(grid);
+  volume::GridAccessor values(grid);
   for (int i = 0; i < result.size[0]; ++i)
     for (int j = 0; j < result.size[1]; ++j)
       for (int k = 0; k < result.size[2]; ++k)

@@ -66,7 +66,7 @@ double peak_mib(const std::function<void()>& work) {
 struct Scene {
   TriangleMesh mesh;
   int dim;
-  GridTransform lattice;
+  volume::GridTransform lattice;
   double voxel() const { return lattice.m[0]; }
   /// Relative error of the volume of so many voxels.
   double error(double voxels) const {
@@ -82,12 +82,12 @@ void report(const Scene& scene, const char* program, int threads, const Times& t
   std::fflush(stdout);
 }
 
-double voxels_inside(const InsideScan& scan) {
+double voxels_inside(const voxelization::InsideScan& scan) {
   double sum = 0;
   for (const auto& leaf : scan.bits)
     for (const std::uint64_t word : leaf)
       sum += std::popcount(word);
-  for (const TileView& t : scan.tiles)
+  for (const volume::TileView& t : scan.tiles)
     sum += std::pow(t.dim, 3);
   return sum;
 }
@@ -323,22 +323,25 @@ void bench_ours(const Scene& scene) {
   // The peaks first: a child may not inherit TBB's threads.
   Context one;
   one.threads = 1;
-  InsideScan scan;
-  Grid grid;
+  voxelization::InsideScan scan;
+  volume::Grid grid;
   const double scan_peak =
-      peak_mib([&] { scan = scan_inside(one, scene.mesh, scene.lattice, {}); });
-  const double grid_peak = peak_mib([&] { grid = voxelize(one, scene.mesh, scene.lattice, {}); });
+      peak_mib([&] { scan = voxelization::scan_inside(one, scene.mesh, scene.lattice, {}); });
+  const double grid_peak =
+      peak_mib([&] { grid = voxelization::voxelize(one, scene.mesh, scene.lattice, {}); });
   for (const int threads : {1, 2}) {
     Context context;
     context.threads = threads;
-    Times times = measure([&] { scan = scan_inside(context, scene.mesh, scene.lattice, {}); });
+    Times times =
+        measure([&] { scan = voxelization::scan_inside(context, scene.mesh, scene.lattice, {}); });
     report(scene, "voxelize: bits", threads, times, scene.error(voxels_inside(scan)), scan_peak);
     times = measure([&] {
       grid = {}; // not to hold two at once
-      grid = voxelize(context, scene.mesh, scene.lattice, {});
+      grid = voxelization::voxelize(context, scene.mesh, scene.lattice, {});
     });
     report(scene, "voxelize: grid", threads, times,
-           scene.error(volume_stats({}, grid).volume / std::pow(scene.voxel(), 3)), grid_peak);
+           scene.error(volume::volume_stats({}, grid).volume / std::pow(scene.voxel(), 3)),
+           grid_peak);
   }
   std::fprintf(stderr, "voxelize %d: the grid holds %.1f MiB\n", scene.dim,
                static_cast<double>(grid.memory_bytes()) / 0x1p20);
@@ -348,10 +351,10 @@ TriangleMesh bench_mesh() {
   const std::string path = test::shared_folder() + "/data/gca90_large_intestine_20k.stl";
   if (!std::filesystem::exists(path))
     return test::sphere_mesh(6, 100, {0.1, 0.2, 0.3});
-  Input input(path);
-  MeshReadOptions options;
-  options.kind = Kind::stl;
-  return subdivided(read_mesh(input, options));
+  formats::Input input(path);
+  formats::MeshReadOptions options;
+  options.kind = formats::Kind::stl;
+  return subdivided(formats::read_mesh(input, options));
 }
 
 } // namespace
@@ -369,7 +372,7 @@ int main(int argc, char** argv) {
   const TriangleMesh mesh = bench_mesh();
   std::vector<Scene> scenes;
   for (const int dim : sizes)
-    scenes.push_back({mesh, dim, lattice_for_dim(bounding_box(mesh), dim)});
+    scenes.push_back({mesh, dim, volume::lattice_for_dim(bounding_box(mesh), dim)});
   for (const Scene& scene : scenes) {
     bench_ours(scene);
     bench_embree(scene);

@@ -50,14 +50,14 @@ double difference(std::span<const double> a, std::span<const double> b) {
 }
 
 struct Organ {
-  Model model;
-  StiffnessMatrix matrix;
-  FactorData factor;
+  model::Model model;
+  linalg::StiffnessMatrix matrix;
+  linalg::FactorData factor;
   std::vector<std::uint32_t> nodes; ///< that may be pulled, ascending
 };
 
-Load pull(const Organ& organ, double size, double turn) {
-  Load load;
+contact::Load pull(const Organ& organ, double size, double turn) {
+  contact::Load load;
   for (std::size_t k = 0; k < pulled; ++k)
     load.displacement[organ.nodes[k]] =
         size * Vec3{0.5 * std::sin(turn + static_cast<double>(k)), 0.3 * std::cos(turn), 1};
@@ -66,10 +66,10 @@ Load pull(const Organ& organ, double size, double turn) {
 
 void elastostatic(const Organ& organ, double size, const std::vector<double>& exact, bool single,
                   double tolerance) {
-  Elastostatic object(
-      organ.model,
-      compliance_of_store(memory_stiffness(organ.matrix, organ.factor, organ.nodes, single)),
-      with_threads(1), {.tolerance = tolerance});
+  statics::Elastostatic object(organ.model,
+                               compliance::compliance_of_store(memory_stiffness(
+                                   organ.matrix, organ.factor, organ.nodes, single)),
+                               with_threads(1), {.tolerance = tolerance});
   std::vector<double> times;
   for (int run = 0; run < 41; ++run) {
     object.update(pull(organ, size, 1 + run % 7)); // another pull of the same nodes
@@ -86,13 +86,15 @@ void elastostatic(const Organ& organ, double size, const std::vector<double>& ex
 
 void elastodynamic(const Organ& organ, double size, const std::vector<double>& exact,
                    bool implicit) {
-  std::unique_ptr<BodyMotion> mover;
+  std::unique_ptr<dynamics::BodyMotion> mover;
   if (implicit)
-    mover = std::make_unique<SolidDynamic>(organ.model, SolidChoice{}, with_threads(1));
+    mover = std::make_unique<dynamics::SolidDynamic>(organ.model, integrator::SolidChoice{},
+                                                     with_threads(1));
   else
-    mover = std::make_unique<Elastodynamic>(organ.model);
-  BodyMotion& object = *mover;
-  const double step = implicit ? 1.0 / 60 : safe_step_fraction * safe_step(organ.model);
+    mover = std::make_unique<dynamics::Elastodynamic>(organ.model);
+  dynamics::BodyMotion& object = *mover;
+  const double step =
+      implicit ? 1.0 / 60 : dynamics::safe_step_fraction * model::safe_step(organ.model);
   object.set_load(pull(organ, size, 0), 0);
   double spent = 0, time = 0, chunk = implicit ? 0.1 : 0.01;
   while (time < 60 && spent < 8000 && !object.resting()) {
@@ -101,7 +103,7 @@ void elastodynamic(const Organ& organ, double size, const std::vector<double>& e
     time += chunk;
     chunk = 0.3 * time;
     std::vector<double> u;
-    for (const NodeMotion& m : object.motion())
+    for (const dynamics::NodeMotion& m : object.motion())
       for (int a = 0; a < 3; ++a)
         u.push_back(m.displacement[a]);
     report(implicit ? "elastodynamic implicit" : "elastodynamic", organ.model.nodes.size(),
@@ -118,21 +120,22 @@ int main() {
     (void)std::fputs("work_error: no shared data, a ball instead\n", stderr);
     mesh = test::sphere_mesh(4, 100, {});
   }
-  Organ organ{build_model(mesh, {}, Context{}).model, {}, {}, {}};
-  organ.matrix = stiffness_matrix(organ.model);
-  organ.factor = Factor(organ.matrix, Context{}).data();
+  Organ organ{model::build_model(mesh, {}, Context{}).model, {}, {}, {}};
+  organ.matrix = fem::stiffness_matrix(organ.model);
+  organ.factor = linalg::Factor(organ.matrix, Context{}).data();
   for (std::uint32_t k = 0; k < pulled; ++k)
-    organ.nodes.push_back(static_cast<std::uint32_t>(surface_count(organ.model)) / 7 * (k + 1));
+    organ.nodes.push_back(static_cast<std::uint32_t>(model::surface_count(organ.model)) / 7 *
+                          (k + 1));
   double edges = 0;
   std::size_t count = 0;
-  for (const Spring& s : organ.model.springs)
-    if (s.kind == SpringKind::edge) {
+  for (const model::Spring& s : organ.model.springs)
+    if (s.kind == model::SpringKind::edge) {
       edges += s.rest;
       ++count;
     }
   const double size = 1e-6 * edges / static_cast<double>(count);
   // The reference holds the nodes in the matrix and reads no column.
-  Elastostatic reference(organ.model, {}, with_threads(1), {.block_limit = 0});
+  statics::Elastostatic reference(organ.model, {}, with_threads(1), {.block_limit = 0});
   reference.update(pull(organ, size, 0));
   const std::vector<double> exact(reference.displacement().begin(), reference.displacement().end());
   for (const bool single : {false, true})

@@ -37,6 +37,23 @@ test_headers() {
   wrong lib/base/a.h '#include <vector>'
 }
 
+test_namespaces() {
+  right lib/fem/a.h '#pragma once' 'namespace gewebe::fem {' 'struct A {};' '} // namespace gewebe::fem'
+  right lib/fem/a.cpp 'namespace gewebe::fem {' 'namespace {' '} // namespace' '} // namespace gewebe::fem'
+  right lib/fem/a.cpp 'namespace gewebe::fem::a {' '} // namespace gewebe::fem::a'
+  right lib/fem/a.h '#pragma once' 'namespace gewebe::model {' 'class Model;' '} // namespace gewebe::model' '' 'namespace gewebe::fem {' '} // namespace gewebe::fem'
+  right lib/base/a.cpp 'namespace gewebe {' '} // namespace gewebe'
+  right formats/mesh/a.cpp 'namespace gewebe::formats {' '} // namespace gewebe::formats'
+  right tools/run/a.cpp 'namespace gewebe::cli {' '} // namespace gewebe::cli'
+  right tests/unit/a.cpp 'namespace gewebe::test {' '} // namespace gewebe::test'
+  wrong lib/fem/a.cpp 'namespace gewebe {' '} // namespace gewebe'
+  wrong lib/fem/a.cpp 'namespace gewebe::model {' 'int f() {' '} // namespace gewebe::model'
+  wrong lib/base/a.cpp 'namespace gewebe::base {' 'int f() {' '} // namespace gewebe::base'
+  wrong lib/fem/a.h '#pragma once' 'struct A {};'
+  wrong formats/mesh/a.cpp 'namespace gewebe {' '} // namespace gewebe'
+  wrong tools/run/a.cpp 'namespace gewebe {' '} // namespace gewebe'
+}
+
 test_installed_headers() {
   mkdir -p lib
   printf '%s\n' '# a comment' 'base/a.h' 'formats/mesh/b.h # another' >lib/PUBLIC

@@ -11,19 +11,19 @@
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   try {
     const std::string_view text(reinterpret_cast<const char*>(data), size);
-    const gewebe::Model model = gewebe::parse_ela(text, "fuzz");
+    const gewebe::model::Model model = gewebe::formats::parse_ela(text, "fuzz");
     try {
-      if (gewebe::parse_ela(gewebe::ela_text(model), "again") != model)
+      if (gewebe::formats::parse_ela(gewebe::formats::ela_text(model), "again") != model)
         std::abort();
-      gewebe::check_model(model);
+      gewebe::model::check_model(model);
     } catch (const gewebe::Error&) { // what is read must be valid, and valid when written
       std::abort();
     }
     gewebe::Context context;
     context.threads = 1;
-    (void)gewebe::model_counts(model, context);
-    (void)gewebe::surface_mesh(model);
-    (void)gewebe::shown_mesh(model);
+    (void)gewebe::model::model_counts(model, context);
+    (void)gewebe::model::surface_mesh(model);
+    (void)gewebe::model::shown_mesh(model);
   } catch (const gewebe::Error&) { // what bad input is for
   }
   return 0;

@@ -17,7 +17,8 @@ void survive(Read&& read, std::string_view bytes) {
     if (image.values.size() != std::size_t{image.width} * image.height * image.channels)
       std::abort();
     if constexpr (sizeof image.values[0] == 1)
-      if (image.values.size() < 100000 && read_png(write_png(image), "again") != image)
+      if (image.values.size() < 100000 &&
+          formats::read_png(formats::write_png(image), "again") != image)
         std::abort();
   } catch (const Error&) {
   }
@@ -27,9 +28,9 @@ void survive(Read&& read, std::string_view bytes) {
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   const std::string_view bytes(reinterpret_cast<const char*>(data), size);
-  survive(gewebe::read_png, bytes);
-  survive(gewebe::read_pnm, bytes);
-  survive(gewebe::read_deep_png, bytes);
-  survive(gewebe::read_deep_pnm, bytes);
+  survive(gewebe::formats::read_png, bytes);
+  survive(gewebe::formats::read_pnm, bytes);
+  survive(gewebe::formats::read_deep_png, bytes);
+  survive(gewebe::formats::read_deep_pnm, bytes);
   return 0;
 }

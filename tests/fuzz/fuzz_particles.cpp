@@ -9,10 +9,10 @@
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   try {
-    const gewebe::Particles particles =
-        gewebe::read_particles(std::string_view(reinterpret_cast<const char*>(data), size), "fuzz");
+    const gewebe::Particles particles = gewebe::formats::read_particles(
+        std::string_view(reinterpret_cast<const char*>(data), size), "fuzz");
     const gewebe::Particles again =
-        gewebe::read_particles(gewebe::write_particles(particles), "again");
+        gewebe::formats::read_particles(gewebe::formats::write_particles(particles), "again");
     if (again.size() != particles.size())
       std::abort();
     for (std::size_t n = 0; n < again.size(); ++n)

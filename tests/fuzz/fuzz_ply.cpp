@@ -8,10 +8,11 @@
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   using namespace gewebe;
   try {
-    const TriangleMesh mesh = read_ply({reinterpret_cast<const char*>(data), size}, "fuzz");
+    const TriangleMesh mesh =
+        formats::read_ply({reinterpret_cast<const char*>(data), size}, "fuzz");
     check_mesh(mesh);
-    const std::string bytes = write_ply(mesh);
-    if (write_ply(read_ply(bytes, "again")) != bytes)
+    const std::string bytes = formats::write_ply(mesh);
+    if (formats::write_ply(formats::read_ply(bytes, "again")) != bytes)
       std::abort();
   } catch (const Error&) {
   }

@@ -47,14 +47,19 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   const Bytes bytes(data, size);
   const std::string path = bytes.path();
   attempt([&] {
-    const gewebe::ResultIndex index = gewebe::read_result_index(path);
+    const gewebe::formats::ResultIndex index = gewebe::formats::read_result_index(path);
     for (const std::string& object : index.objects)
       for (const std::size_t frame : {std::size_t{0}, index.times.size()}) {
-        attempt([&] { check_mesh(gewebe::read_result_surface(path, object, frame).mesh); });
-        attempt([&] { check_mesh(gewebe::read_result_solid(path, object, frame).mesh); });
+        attempt([&] {
+          gewebe::check_mesh(gewebe::formats::read_result_surface(path, object, frame).mesh);
+        });
+        attempt([&] {
+          gewebe::tetrahedra::check_mesh(
+              gewebe::formats::read_result_solid(path, object, frame).mesh);
+        });
       }
     for (const std::size_t frame : {std::size_t{0}, index.times.size() / 2})
-      attempt([&] { (void)gewebe::read_result_instruments(path, frame); });
+      attempt([&] { (void)gewebe::formats::read_result_instruments(path, frame); });
   });
   return 0;
 }

@@ -20,25 +20,25 @@ namespace {
 using namespace gewebe;
 
 /// A tetrahedron, one corner of which is held; with its centre tied to a fixed node beside it.
-Model small_model() {
-  Model m;
+model::Model small_model() {
+  model::Model m;
   m.name = "small";
   m.materials.resize(1);
   m.materials[0].name = "m";
   const Vec3 places[]{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
   for (const Vec3& p : places) {
-    Node n;
+    model::Node n;
     n.position = p;
     n.mass = 1;
     n.drag = 0.1;
     m.nodes.push_back(n);
   }
   for (std::size_t i = 0; i < 3; ++i)
-    m.nodes[i].fixed = i == 0 ? fixed_all : fixed_z;
+    m.nodes[i].fixed = i == 0 ? model::fixed_all : model::fixed_z;
   for (std::uint32_t i = 0; i < 4; ++i)
     for (std::uint32_t j = i + 1; j < 4; ++j)
-      m.springs.push_back(
-          {i, j, SpringKind::edge, 10, 0.1, norm(m.nodes[j].position - m.nodes[i].position)});
+      m.springs.push_back({i, j, model::SpringKind::edge, 10, 0.1,
+                           norm(m.nodes[j].position - m.nodes[i].position)});
   m.triangles = {{0, 2, 1}, {0, 1, 3}, {0, 3, 2}, {1, 2, 3}};
   return m;
 }
@@ -46,7 +46,7 @@ Model small_model() {
 struct Stop {};
 
 /// Whether the bytes are whole frames, of which the last is `kind`.
-bool are_frames(std::string_view bytes, FrameKind kind) {
+bool are_frames(std::string_view bytes, formats::FrameKind kind) {
   std::uint32_t last = UINT32_MAX;
   while (!bytes.empty()) {
     std::uint32_t magic = 0;
@@ -56,7 +56,7 @@ bool are_frames(std::string_view bytes, FrameKind kind) {
     std::memcpy(&magic, bytes.data(), 4);
     std::memcpy(&last, bytes.data() + 4, 4);
     std::memcpy(&count, bytes.data() + 20, 8);
-    if (magic != frame_magic || count > (bytes.size() - 28) / 4)
+    if (magic != formats::frame_magic || count > (bytes.size() - 28) / 4)
       return false;
     bytes.remove_prefix(28 + 4 * count);
   }
@@ -66,10 +66,10 @@ bool are_frames(std::string_view bytes, FrameKind kind) {
 enum class Reply { none, refusal, ok, step, told };
 
 Reply binary_reply(std::string_view frames) {
-  for (const auto& [kind, reply] : {std::pair{FrameKind::error, Reply::refusal},
-                                    {FrameKind::ok, Reply::ok},
-                                    {FrameKind::done, Reply::step},
-                                    {FrameKind::told, Reply::told}})
+  for (const auto& [kind, reply] : {std::pair{formats::FrameKind::error, Reply::refusal},
+                                    {formats::FrameKind::ok, Reply::ok},
+                                    {formats::FrameKind::done, Reply::step},
+                                    {formats::FrameKind::told, Reply::told}})
     if (are_frames(frames, kind))
       return reply;
   return Reply::none;
@@ -93,13 +93,14 @@ Reply text_reply(std::string_view text) {
 
 void play(std::string_view text, bool serving, bool binary) {
   std::size_t answers = 0, objects = 0, refusals = 0, ended = 0;
-  SceneOptions options;
+  cli::SceneOptions options;
   options.files.model = [&](const std::string&) {
     if (++objects > 4)
       throw Stop{};
     return small_model();
   };
-  options.files.store = [](const std::string& name, const Model&) -> StoredStiffness {
+  options.files.store = [](const std::string& name,
+                           const model::Model&) -> compliance::StoredStiffness {
     throw Error(name, "no store here");
   };
   options.files.node_list = [](const std::string&) { return std::string("1 3"); };
@@ -124,7 +125,7 @@ void play(std::string_view text, bool serving, bool binary) {
       throw Stop{};
     return false;
   };
-  SceneRun run("fuzz", context, options);
+  cli::SceneRun run("fuzz", context, options);
   try {
     while (!text.empty() && !run.ended()) {
       const std::size_t end = text.find('\n');

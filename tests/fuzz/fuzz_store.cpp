@@ -10,11 +10,12 @@
 
 namespace {
 
-void use(const gewebe::StiffnessStore& store, const gewebe::StiffnessFacts& facts) {
-  const gewebe::StiffnessMatrix matrix = store.matrix(facts);
-  const gewebe::Factor factor = store.factor(facts);
+void use(const gewebe::formats::StiffnessStore& store,
+         const gewebe::formats::StiffnessFacts& facts) {
+  const gewebe::linalg::StiffnessMatrix matrix = store.matrix(facts);
+  const gewebe::linalg::Factor factor = store.factor(facts);
   std::vector<double> f(3 * facts.nodes, 1.0), u(f.size());
-  gewebe::solve_axes(matrix, factor, f, u);
+  gewebe::linalg::solve_axes(matrix, factor, f, u);
   if (const auto columns = store.columns(facts)) {
     std::vector<double> row(9 * columns->node_count());
     for (std::size_t k = 0; k < columns->nodes().size(); ++k)
@@ -29,7 +30,7 @@ void use(const gewebe::StiffnessStore& store, const gewebe::StiffnessFacts& fact
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   try {
-    const gewebe::StiffnessStore store(std::span(data, size), "fuzz");
+    const gewebe::formats::StiffnessStore store(std::span(data, size), "fuzz");
     for (const std::string& name : store.objects())
       use(store, store.facts(name));
   } catch (const gewebe::Error&) { // what bad input is for

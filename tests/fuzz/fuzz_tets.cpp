@@ -16,15 +16,15 @@ namespace {
 
 using namespace gewebe;
 
-TetMesh mesh_of(std::string_view bytes) {
-  Kind kind = kind_from_magic(bytes.substr(0, 4096));
-  if (kind == Kind::unknown && bytes.starts_with('*')) // no other format begins so
-    kind = Kind::inp;
+tetrahedra::TetMesh mesh_of(std::string_view bytes) {
+  formats::Kind kind = formats::kind_from_magic(bytes.substr(0, 4096));
+  if (kind == formats::Kind::unknown && bytes.starts_with('*')) // no other format begins so
+    kind = formats::Kind::inp;
   constexpr std::string_view border = "# ele\n";
   const std::size_t at = bytes.find(border);
-  if (kind != Kind::unknown || at == std::string_view::npos)
-    return tet_mesh_from_bytes(bytes, "fuzz", kind);
-  return tet_mesh_from_tetgen(
+  if (kind != formats::Kind::unknown || at == std::string_view::npos)
+    return formats::tet_mesh_from_bytes(bytes, "fuzz", kind);
+  return formats::tet_mesh_from_tetgen(
       {std::string(bytes.substr(0, at)), std::string(bytes.substr(at + border.size()))},
       {"fuzz.node", "fuzz.ele"});
 }
@@ -33,23 +33,25 @@ TetMesh mesh_of(std::string_view bytes) {
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   try {
-    TetMesh mesh = mesh_of({reinterpret_cast<const char*>(data), size});
-    check_mesh(mesh);
-    for (const Kind kind :
-         {Kind::ply, Kind::vtu, Kind::msh, Kind::msh4, Kind::medit, Kind::vtk, Kind::inp}) {
-      const std::string bytes = tet_mesh_bytes(mesh, kind);
-      if (tet_mesh_bytes(tet_mesh_from_bytes(bytes, "again", kind), kind) != bytes)
+    tetrahedra::TetMesh mesh = mesh_of({reinterpret_cast<const char*>(data), size});
+    tetrahedra::check_mesh(mesh);
+    for (const formats::Kind kind :
+         {formats::Kind::ply, formats::Kind::vtu, formats::Kind::msh, formats::Kind::msh4,
+          formats::Kind::medit, formats::Kind::vtk, formats::Kind::inp}) {
+      const std::string bytes = formats::tet_mesh_bytes(mesh, kind);
+      if (formats::tet_mesh_bytes(formats::tet_mesh_from_bytes(bytes, "again", kind), kind) !=
+          bytes)
         std::abort();
     }
-    (void)tet_quality(mesh);
-    (void)repair_tetrahedra(mesh);
-    const TetReport report = examine_tetrahedra(mesh);
+    (void)tetrahedra::tet_quality(mesh);
+    (void)tetrahedra::repair_tetrahedra(mesh);
+    const tetrahedra::TetReport report = tetrahedra::examine_tetrahedra(mesh);
     if (report.inverted.count + report.duplicates.count + report.unused_points.count != 0)
       std::abort();
     if (mesh.middles.empty())
-      make_quadratic(mesh);
-    (void)order_nodes(mesh);
-    check_mesh(mesh);
+      tetrahedra::make_quadratic(mesh);
+    (void)tetrahedra::order_nodes(mesh);
+    tetrahedra::check_mesh(mesh);
   } catch (const Error&) { // what bad input is for
   }
   return 0;

@@ -9,8 +9,8 @@
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   try {
-    const gewebe::Grid grid =
-        gewebe::volume_from_bytes(std::string(reinterpret_cast<const char*>(data), size), "fuzz");
+    const gewebe::volume::Grid grid = gewebe::formats::volume_from_bytes(
+        std::string(reinterpret_cast<const char*>(data), size), "fuzz");
     (void)grid.digest();
   } catch (const gewebe::Error&) { // what bad input is for
   }

@@ -12,11 +12,12 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   using namespace gewebe;
   try {
     const std::string_view input(reinterpret_cast<const char*>(data), size);
-    const TriangleMesh mesh = input.starts_with("# vtk") ? read_vtk_surface(input, "fuzz", nullptr)
-                                                         : read_vtp(input, "fuzz");
+    const TriangleMesh mesh = input.starts_with("# vtk")
+                                  ? formats::read_vtk_surface(input, "fuzz", nullptr)
+                                  : formats::read_vtp(input, "fuzz");
     check_mesh(mesh);
-    const std::string bytes = write_ply(mesh);
-    if (write_ply(read_ply(bytes, "again")) != bytes)
+    const std::string bytes = formats::write_ply(mesh);
+    if (formats::write_ply(formats::read_ply(bytes, "again")) != bytes)
       std::abort();
   } catch (const Error&) {
   }

@@ -29,12 +29,12 @@ constexpr int cuts_of_solid = 10;
 
 struct Body {
   std::string name;
-  TetMesh mesh;
+  tetrahedra::TetMesh mesh;
 };
 
 std::vector<Body> bodies() {
   std::vector<Body> all;
-  all.push_back({"balls", stuff({}, scenes::metaballs(24, 7, 2.3), {})});
+  all.push_back({"balls", stuffing::stuff({}, scenes::metaballs(24, 7, 2.3), {})});
   all.push_back({"liver", test::organ_tetrahedra("sofa_liver_smooth.obj", 20)});
   all.push_back({"spleen", test::organ_tetrahedra("hubmap_F_spleen_uv.obj", 28)});
   std::erase_if(all, [](const Body& body) { return body.mesh.tetrahedra.empty(); });
@@ -61,8 +61,8 @@ private:
 };
 
 /// An edge that moves on and turns a little with each step.
-TriangleMesh sweep(const TetMesh& mesh, Chance& chance) {
-  const Box3 box = bounding_box(mesh);
+TriangleMesh sweep(const tetrahedra::TetMesh& mesh, Chance& chance) {
+  const Box3 box = tetrahedra::bounding_box(mesh);
   const double size = box.longest_side();
   Vec3 at = mesh.points[chance.below(static_cast<std::uint32_t>(mesh.points.size()))];
   Vec3 forward = chance.direction(), edge = cross(forward, chance.direction());
@@ -96,26 +96,27 @@ struct Totals {
   std::vector<double> times;                    ///< ms, of cuts that touch something
 };
 
-double least_margin(const TetMesh& mesh) {
+double least_margin(const tetrahedra::TetMesh& mesh) {
   double least = 180;
   for (std::size_t t = 0; t < mesh.tetrahedra.size(); ++t)
     least = test::smaller(least, test::least_margin(mesh, t));
   return least;
 }
 
-double mean_edge(const TetMesh& mesh) {
+double mean_edge(const tetrahedra::TetMesh& mesh) {
   double sum = 0;
   for (const Tetrahedron& t : mesh.tetrahedra)
-    for (const auto& edge : tetrahedron_edges)
+    for (const auto& edge : tetrahedra::tetrahedron_edges)
       sum += norm(mesh.points[t[edge[0]]] - mesh.points[t[edge[1]]]);
   return sum / (6 * static_cast<double>(mesh.tetrahedra.size()));
 }
 
 /// One cut of the mesh, which becomes what is left.
-void cut_once(TetMesh& mesh, const TriangleMesh& blade, const BladeCutOptions& options, double edge,
-              const std::string& name, Totals& totals) {
+void cut_once(tetrahedra::TetMesh& mesh, const TriangleMesh& blade,
+              const incision::BladeCutOptions& options, double edge, const std::string& name,
+              Totals& totals) {
   const auto start = std::chrono::steady_clock::now();
-  TetCut cut = cut_tetrahedra(mesh, blade, options);
+  incision::TetCut cut = incision::cut_tetrahedra(mesh, blade, options);
   const double time =
       std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count();
   const std::string fault = test::fault_of(mesh, cut, options.least_angle);
@@ -124,7 +125,7 @@ void cut_once(TetMesh& mesh, const TriangleMesh& blade, const BladeCutOptions& o
     ++totals.failed;
     std::printf("%s: FAILED: %s\n", name.c_str(), fault.c_str());
   }
-  const BladeCutReport& report = cut.report;
+  const incision::BladeCutReport& report = cut.report;
   if (report.separated == 0)
     ++totals.empty;
   else
@@ -144,17 +145,17 @@ void cut_once(TetMesh& mesh, const TriangleMesh& blade, const BladeCutOptions& o
 
 void strain(const Body& body, std::uint32_t seed, std::uint64_t cuts, Totals& totals) {
   Chance chance(seed);
-  TetMesh mesh = body.mesh;
+  tetrahedra::TetMesh mesh = body.mesh;
   const double edge = mean_edge(mesh);
   if (seed % 3 == 0)
     for (const Tetrahedron& t : mesh.tetrahedra)
       mesh.material.push_back(norm(mesh.points[t[0]] - mesh.points[0]) > 6 * edge ? 1 : 0);
   if (seed % 4 == 3)
-    make_quadratic(mesh);
+    tetrahedra::make_quadratic(mesh);
   for (int n = 0; n < cuts_of_solid && totals.cuts < cuts; ++n) {
     const TriangleMesh blade = sweep(mesh, chance);
     const std::string name = body.name + " " + std::to_string(seed) + ", cut " + std::to_string(n);
-    BladeCutOptions options;
+    incision::BladeCutOptions options;
     std::vector<Vec3> places;
     if (seed % 4 == 1) {
       const Vec3 bend = chance.direction() * 0.02;

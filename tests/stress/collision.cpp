@@ -35,7 +35,7 @@ using test::Vector;
 using Quad = std::array<Vec3, 4>;
 
 /// Six times the volume of the four points; 0 where they are coplanar.
-Number volume(const ExactQuad& x) {
+Number exact_volume(const ExactQuad& x) {
   return dot(cross(minus(x[1], x[0]), minus(x[2], x[0])), minus(x[3], x[0]));
 }
 
@@ -52,8 +52,8 @@ ExactQuad at(const Quad& x0, const Quad& x1, const Number& t) {
 /// It is a cubic in t, given by four values.
 bool never_coplanar(const Quad& x0, const Quad& x1, const Number& a, const Number& b) {
   const Number h = (b - a) / 3;
-  const Number f0 = volume(at(x0, x1, a)), f1 = volume(at(x0, x1, a + h)),
-               f2 = volume(at(x0, x1, b - h)), f3 = volume(at(x0, x1, b));
+  const Number f0 = exact_volume(at(x0, x1, a)), f1 = exact_volume(at(x0, x1, a + h)),
+               f2 = exact_volume(at(x0, x1, b - h)), f3 = exact_volume(at(x0, x1, b));
   const Number c1 = (-5 * f0 + 18 * f1 - 9 * f2 + 2 * f3) / 6,
                c2 = (2 * f0 - 9 * f1 + 18 * f2 - 5 * f3) / 6;
   const int s = sgn(f0);

@@ -22,9 +22,9 @@ namespace {
 
 using namespace gewebe;
 
-class Checked final : public ColumnSink {
+class Checked final : public columns::ColumnSink {
 public:
-  Checked(const StiffnessMatrix& matrix, std::span<const std::uint32_t> nodes)
+  Checked(const linalg::StiffnessMatrix& matrix, std::span<const std::uint32_t> nodes)
       : matrix_(matrix), nodes_(nodes), x_(matrix.order()), y_(matrix.order()) {
     for (std::size_t row = 0; row < matrix.order(); row += 1 + matrix.order() / 200)
       sample_.push_back(row);
@@ -70,7 +70,7 @@ public:
 
 private:
   double defect_of(std::size_t row) {
-    multiply(matrix_, x_, y_);
+    linalg::multiply(matrix_, x_, y_);
     y_[row] -= 1;
     double worst = 0;
     for (const double y : y_)
@@ -78,7 +78,7 @@ private:
     return worst;
   }
 
-  const StiffnessMatrix& matrix_;
+  const linalg::StiffnessMatrix& matrix_;
   std::span<const std::uint32_t> nodes_;
   std::vector<double> x_, y_, kept_; // kept_: of each sampled row all columns
   std::vector<std::size_t> sample_;
@@ -94,15 +94,15 @@ int main(int argc, char** argv) {
     (void)std::fputs("compliance: no shared data, a ball instead\n", stderr);
     organ = test::sphere_mesh(5, 100, {});
   }
-  const Model model = build_model(organ, {}, Context{}).model;
-  const StiffnessMatrix matrix = stiffness_matrix(model);
-  StiffnessCheck check;
-  const Factor factor = checked_factor(model, matrix, Context{}, check);
+  const model::Model model = model::build_model(organ, {}, Context{}).model;
+  const linalg::StiffnessMatrix matrix = fem::stiffness_matrix(model);
+  linalg::StiffnessCheck check;
+  const linalg::Factor factor = linalg::checked_factor(model, matrix, Context{}, check);
   std::vector<std::uint32_t> nodes;
   for (std::uint32_t i = 0; i < model.nodes.size(); i += every)
     nodes.push_back(i);
   Checked checked(matrix, nodes);
-  (void)compliance_columns(matrix, factor, check.norm, nodes, Context{}, checked);
+  (void)columns::compliance_columns(matrix, factor, check.norm, nodes, Context{}, checked);
   const double symmetry = checked.asymmetry(),
                allowed = 10 * std::numeric_limits<double>::epsilon() * check.condition;
   std::printf("%zu nodes, %zu columns: max|K C - I| %.3g (with one number changed by 1e-9: %.3g), "

@@ -38,14 +38,14 @@ void check(bool good, const std::string& what) {
     std::printf("failed: %s\n", what.c_str());
 }
 
-double residual(const Model& model, std::span<const double> u, std::span<const double> f) {
-  const StiffnessMatrix matrix = stiffness_matrix(model);
+double residual(const model::Model& model, std::span<const double> u, std::span<const double> f) {
+  const linalg::StiffnessMatrix matrix = fem::stiffness_matrix(model);
   std::vector<double> x, right;
   for (const std::int64_t axis : matrix.axis_of_row) {
     x.push_back(u[static_cast<std::size_t>(axis)]);
     right.push_back(f[static_cast<std::size_t>(axis)]);
   }
-  return backward_error(matrix, stiffness_norm(matrix), x, right);
+  return linalg::backward_error(matrix, linalg::stiffness_norm(matrix), x, right);
 }
 
 std::vector<double> random_load(std::size_t axes, std::mt19937& random) {
@@ -56,15 +56,16 @@ std::vector<double> random_load(std::size_t axes, std::mt19937& random) {
 }
 
 void cut_often(const char* name, const TriangleMesh& mesh, int cuts) {
-  auto model = std::make_shared<const Model>(build_model(mesh, {}, Context{}).model);
+  auto model = std::make_shared<const model::Model>(model::build_model(mesh, {}, Context{}).model);
   const Context context;
   std::vector<std::uint32_t> touched;
-  for (std::uint32_t i = 0; i < surface_count(*model); i += 101)
+  for (std::uint32_t i = 0; i < model::surface_count(*model); i += 101)
     touched.push_back(i);
-  const StiffnessMatrix matrix = stiffness_matrix(*model);
-  const FactorData factor = Factor(matrix, context).data();
-  CutStiffness stiffness(
-      model, compliance_of_store(timing::memory_stiffness(matrix, factor, touched, false)),
+  const linalg::StiffnessMatrix matrix = fem::stiffness_matrix(*model);
+  const linalg::FactorData factor = linalg::Factor(matrix, context).data();
+  update::CutStiffness stiffness(
+      model,
+      compliance::compliance_of_store(timing::memory_stiffness(matrix, factor, touched, false)),
       context);
   stiffness.prepare();
   std::mt19937 random(7);
@@ -73,30 +74,31 @@ void cut_often(const char* name, const TriangleMesh& mesh, int cuts) {
   double worst_condition = 0;
   std::size_t refused = 0, springs = 0, told = 0;
   for (int done = 0; done < cuts;) {
-    std::optional<CutModel> next = test::random_cut(*model, random, 50);
+    std::optional<cutting::CutModel> next = test::random_cut(*model, random, 50);
     if (!next)
       continue;
     const std::size_t removed = next->removed + next->doubled;
-    auto now = std::make_shared<const Model>(std::move(next->model));
+    auto now = std::make_shared<const model::Model>(std::move(next->model));
     std::vector<double> f = random_load(3 * now->nodes.size(), random);
-    StiffnessMatrix matrix_now = stiffness_matrix(*now);
-    std::optional<AxisSolver> fresh;
+    linalg::StiffnessMatrix matrix_now = fem::stiffness_matrix(*now);
+    std::optional<compliance::AxisSolver> fresh;
     double condition = HUGE_VAL;
     try {
-      Factor factor_now(matrix_now, context);
-      condition = stiffness_norm(matrix_now) * inverse_norm(factor_now);
-      fresh.emplace(AxisSolver{std::move(factor_now), std::move(matrix_now.row_of_axis)});
-    } catch (const NotPositiveDefinite&) {
+      linalg::Factor factor_now(matrix_now, context);
+      condition = linalg::stiffness_norm(matrix_now) * linalg::inverse_norm(factor_now);
+      fresh.emplace(
+          compliance::AxisSolver{std::move(factor_now), std::move(matrix_now.row_of_axis)});
+    } catch (const linalg::NotPositiveDefinite&) {
       // A part hangs loose.
     }
     if (!(condition < condition_limit)) { // solutions would differ by their condition alone
       ++refused;
-      if (condition < 10 * max_condition || told == 3)
+      if (condition < 10 * linalg::max_condition || told == 3)
         continue;
       ++told;
       bool refuses = false;
       try {
-        CutStiffness other(model, nullptr, context);
+        update::CutStiffness other(model, nullptr, context);
         (void)other.cut(now, next->origin, next->place);
       } catch (const Error&) {
         refuses = true;
@@ -106,11 +108,11 @@ void cut_often(const char* name, const TriangleMesh& mesh, int cuts) {
     }
     worst_condition = test::larger(worst_condition, condition);
     // Each fourth cut by Woodbury, which on so few nodes is never the cheapest.
-    const CutWork work =
+    const update::CutWork work =
         stiffness.cut(now, next->origin, next->place,
-                      done % 4 == 3 ? std::optional(CutWay::woodbury) : std::nullopt);
-    const std::shared_ptr<ComplianceSource> compliance = stiffness.compliance();
-    const ColumnSource& stored = *compliance->columns();
+                      done % 4 == 3 ? std::optional(update::CutWay::woodbury) : std::nullopt);
+    const std::shared_ptr<compliance::ComplianceSource> compliance = stiffness.compliance();
+    const columns::ColumnSource& stored = *compliance->columns();
     ++ways[static_cast<std::size_t>(work.way)];
     springs += removed;
     std::vector<double> u = f, expected = f;
@@ -137,7 +139,7 @@ void cut_often(const char* name, const TriangleMesh& mesh, int cuts) {
     if (now->nodes.size() == model->nodes.size()) {
       // A solver of before must not pass.
       std::vector<double> old = f;
-      factorise_axes(*model, context).solve(old);
+      compliance::factorise_axes(*model, context).solve(old);
       control = test::smaller(control, test::relative_difference(old, expected));
     }
     model = std::move(now);

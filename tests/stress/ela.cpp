@@ -11,8 +11,9 @@ namespace {
 
 using namespace gewebe;
 
-double energy_of(const Model& model, const Elastodynamic& object) {
-  return kinetic_energy(model, object.motion()) + elastic_energy(model, object.motion());
+double energy_of(const model::Model& model, const dynamics::Elastodynamic& object) {
+  return dynamics::kinetic_energy(model, object.motion()) +
+         dynamics::elastic_energy(model, object.motion());
 }
 
 int run(std::uint32_t nets, double steps) {
@@ -21,12 +22,12 @@ int run(std::uint32_t nets, double steps) {
   int failures = 0, reported = 0;
   double worst = 0;
   for (std::uint32_t seed = 0; seed < nets; ++seed) {
-    const Model model = test::random_model(seed);
+    const model::Model model = test::random_model(seed);
     const auto start = test::kicked(model, 1e-7, 0);
     for (const double part : {0.99, 1.5}) {
-      Elastodynamic object(model);
+      dynamics::Elastodynamic object(model);
       object.set_motion(start);
-      const double first = energy_of(model, object), h = part * safe_step(model);
+      const double first = energy_of(model, object), h = part * model::safe_step(model);
       bool good = true;
       try {
         (void)object.advance(steps * h, h, context);
@@ -34,7 +35,7 @@ int run(std::uint32_t nets, double steps) {
         good = std::isfinite(growth) && (part > 1 || growth < 200);
         if (part < 1 && !(growth <= worst))
           worst = growth;
-      } catch (const MotionError&) {
+      } catch (const dynamics::MotionError&) {
         good = part > 1;
         ++reported;
       }

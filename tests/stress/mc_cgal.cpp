@@ -21,7 +21,7 @@ using namespace gewebe;
 unsigned broken_by_naive(std::uint32_t count) {
   unsigned broken = 0;
   for (std::uint32_t n = 0; n < count; ++n) {
-    const IsoSurface surface = marching_cubes({}, scenes::stress_scene(n).grid);
+    const surface::IsoSurface surface = surface::marching_cubes({}, scenes::stress_scene(n).grid);
     broken +=
         scenes::stress_complaint(surface.mesh, scenes::snap_naively(surface, 0.35)).empty() ? 0 : 1;
   }

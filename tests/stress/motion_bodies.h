@@ -37,34 +37,35 @@ struct Chance {
 };
 
 struct Kind {
-  SolidLaw law;
+  integrator::SolidLaw law;
   bool quadratic;
 
-  bool slow() const { return law != SolidLaw::corotational && quadratic; }
+  bool slow() const { return law != integrator::SolidLaw::corotational && quadratic; }
   const char* name() const {
-    return law == SolidLaw::corotational ? quadratic ? "corotational quadratic" : "corotational"
-           : quadratic                   ? "Neo-Hookean quadratic"
-                                         : "Neo-Hookean";
+    return law == integrator::SolidLaw::corotational
+               ? quadratic ? "corotational quadratic" : "corotational"
+           : quadratic ? "Neo-Hookean quadratic"
+                       : "Neo-Hookean";
   }
 };
-constexpr std::array<Kind, 4> kinds = {{{SolidLaw::corotational, false},
-                                        {SolidLaw::corotational, true},
-                                        {SolidLaw::hyperelastic, false},
-                                        {SolidLaw::hyperelastic, true}}};
+constexpr std::array<Kind, 4> kinds = {{{integrator::SolidLaw::corotational, false},
+                                        {integrator::SolidLaw::corotational, true},
+                                        {integrator::SolidLaw::hyperelastic, false},
+                                        {integrator::SolidLaw::hyperelastic, true}}};
 
 /// A box whose inner nodes, and those of its faces within them, are shifted.
-inline TetMesh some_mesh(Chance& chance, const Kind& kind) {
+inline tetrahedra::TetMesh some_mesh(Chance& chance, const Kind& kind) {
   const std::uint32_t most = kind.slow() ? 1 : kind.quadratic ? 2 : 3;
   std::array<std::uint32_t, 3> size{};
   for (std::uint32_t& n : size)
     n = 1 + static_cast<std::uint32_t>(chance.random()) % most;
-  TetMesh mesh = box_tetrahedra(size[0], size[1], size[2], body_cell);
+  tetrahedra::TetMesh mesh = box_tetrahedra(size[0], size[1], size[2], body_cell);
   for (Vec3& p : mesh.points)
     for (int a = 0; a < 3; ++a)
       if (p[a] > 0 && p[a] < body_cell * size[static_cast<std::size_t>(a)])
         p[a] += chance.from(-0.15, 0.15) * body_cell;
   if (kind.quadratic)
-    make_quadratic(mesh);
+    tetrahedra::make_quadratic(mesh);
   return mesh;
 }
 
@@ -73,22 +74,22 @@ inline bool sound(std::span<const double> numbers) {
 }
 
 /// How many tetrahedra are inside out, or flat, by their corners.
-inline int inverted(const TetMesh& mesh, std::span<const double> x) {
+inline int inverted(const tetrahedra::TetMesh& mesh, std::span<const double> x) {
   int count = 0;
   for (const Tetrahedron& t : mesh.tetrahedra) {
     std::array<Vec3, 4> p;
     for (std::size_t k = 0; k < 4; ++k)
       p[k] = {x[3 * std::size_t{t[k]}], x[3 * std::size_t{t[k]} + 1], x[3 * std::size_t{t[k]} + 2]};
-    count += tetrahedron_volume(p[0], p[1], p[2], p[3]) > 0 ? 0 : 1;
+    count += tetrahedra::tetrahedron_volume(p[0], p[1], p[2], p[3]) > 0 ? 0 : 1;
   }
   return count;
 }
 
 /// A body whose nodes are anywhere in its box.
 struct Scrambled {
-  TetMesh mesh;
-  SolidMaterial material;
-  SolidMotionOptions options;
+  tetrahedra::TetMesh mesh;
+  fem::SolidMaterial material;
+  integrator::SolidMotionOptions options;
   std::vector<double> displacement; ///< 3 n
 };
 
@@ -101,7 +102,7 @@ inline Scrambled scrambled(std::uint32_t seed, const Kind& kind) {
   Vec3 most;
   for (const Vec3& p : body.mesh.points)
     for (int a = 0; a < 3; ++a)
-      most[a] = larger(most[a], p[a]);
+      most[a] = numeric::larger(most[a], p[a]);
   for (const Vec3& p : body.mesh.points)
     for (int a = 0; a < 3; ++a)
       body.displacement.push_back(chance.from(0, most[a]) - p[a]);

@@ -40,8 +40,8 @@ struct Ends {
 
 void scramble(std::uint32_t seed, const Kind& kind, Ends& ends) {
   const Scrambled of = scrambled(seed, kind);
-  const TetMesh& mesh = of.mesh;
-  SolidMotion body(mesh, std::vector<SolidMaterial>{of.material}, of.options);
+  const tetrahedra::TetMesh& mesh = of.mesh;
+  integrator::SolidMotion body(mesh, std::vector<fem::SolidMaterial>{of.material}, of.options);
   body.set_state(of.displacement, Numbers(of.displacement.size()));
   ++ends.bodies;
   const double first = body.elastic_energy();
@@ -77,7 +77,7 @@ void scramble(std::uint32_t seed, const Kind& kind, Ends& ends) {
 
 struct Arguments {
   std::uint32_t count = 100, seed = 0;
-  std::optional<SolidLaw> law;
+  std::optional<integrator::SolidLaw> law;
   std::optional<bool> quadratic;
 
   bool wants(const Kind& kind) const {
@@ -93,9 +93,9 @@ bool read(std::string_view text, std::uint32_t& to) {
 
 bool read(std::string_view text, Arguments& to) {
   if (text == "law=corotational")
-    to.law = SolidLaw::corotational;
+    to.law = integrator::SolidLaw::corotational;
   else if (text == "law=neo-hookean")
-    to.law = SolidLaw::hyperelastic;
+    to.law = integrator::SolidLaw::hyperelastic;
   else if (text == "order=1")
     to.quadratic = false;
   else if (text == "order=2")
@@ -110,7 +110,7 @@ bool read(std::string_view text, Arguments& to) {
 std::uint32_t count_of(const Kind& kind, const Arguments& arguments) {
   if (arguments.law && arguments.quadratic)
     return arguments.count;
-  const bool quick = kind.law == SolidLaw::corotational && !kind.quadratic;
+  const bool quick = kind.law == integrator::SolidLaw::corotational && !kind.quadratic;
   return quick         ? arguments.count
          : kind.slow() ? (arguments.count + 99) / 100
                        : (arguments.count + 3) / 4;

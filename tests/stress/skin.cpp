@@ -30,18 +30,18 @@ constexpr int cuts_of_skin = 5;
 
 struct Body {
   std::string name;
-  Skin skin;
+  model::Skin skin;
 };
 
 void add(std::vector<Body>& all, const std::string& name, const TriangleMesh& mesh) {
   if (mesh.triangles.empty())
     return;
-  const MeshReport report = examine_mesh(mesh);
+  const mesh::MeshReport report = mesh::examine_mesh(mesh);
   if (!report.closed() || !report.oriented() || !report.manifold()) {
     std::printf("%s is no closed surface, left out\n", name.c_str());
     return;
   }
-  Skin skin;
+  model::Skin skin;
   skin.points = mesh.points;
   skin.triangles = mesh.triangles;
   skin.tetrahedron.assign(mesh.points.size(), 0);
@@ -49,7 +49,7 @@ void add(std::vector<Body>& all, const std::string& name, const TriangleMesh& me
   all.push_back({name, std::move(skin)});
 }
 
-TriangleMesh mesh_of(const Skin& skin) {
+TriangleMesh mesh_of(const model::Skin& skin) {
   TriangleMesh mesh;
   mesh.points = skin.points;
   mesh.triangles = skin.triangles;
@@ -78,7 +78,7 @@ private:
 using Row = std::vector<Vec3>;
 
 /// An edge that moves on and turns a little with each step.
-std::vector<Row> sweep(const Skin& skin, double size, double cell, Chance& chance) {
+std::vector<Row> sweep(const model::Skin& skin, double size, double cell, Chance& chance) {
   Vec3 at = skin.points[chance.below(static_cast<std::uint32_t>(skin.points.size()))];
   Vec3 forward = chance.direction(), edge = cross(forward, chance.direction());
   edge = edge / norm(edge) * (size * chance.between(0.03, 0.5));
@@ -108,15 +108,15 @@ struct Totals {
 };
 
 /// The end of the sheet.
-Row cut_once(Skin& skin, const std::vector<Row>& rows, double cell, double volume,
+Row cut_once(model::Skin& skin, const std::vector<Row>& rows, double cell, double volume,
              const std::string& name, Totals& totals) {
   ++totals.cuts;
   try {
     const std::clock_t start = std::clock();
-    SkinCut cut = cut_skin(skin, strip_sheet(rows), cell, 3 * cell);
+    cutting::SkinCut cut = cutting::cut_skin(skin, cutting::strip_sheet(rows), cell, 3 * cell);
     totals.times.push_back(1000.0 * static_cast<double>(std::clock() - start) / CLOCKS_PER_SEC);
     const TriangleMesh mesh = mesh_of(cut.skin);
-    const MeshReport report = examine_mesh(mesh);
+    const mesh::MeshReport report = mesh::examine_mesh(mesh);
     const double change = std::abs(signed_volume(mesh) / volume - 1);
     totals.volume = test::larger(totals.volume, change);
     if (!report.closed() || !report.oriented() || !report.manifold() || !(change < 1e-6)) {
@@ -138,7 +138,7 @@ Row cut_once(Skin& skin, const std::vector<Row>& rows, double cell, double volum
 
 void strain(const Body& body, std::uint32_t seed, std::uint64_t cuts, Totals& totals) {
   Chance chance(seed);
-  Skin skin = body.skin;
+  model::Skin skin = body.skin;
   Box3 box;
   for (const Vec3& p : skin.points)
     box.add(p);

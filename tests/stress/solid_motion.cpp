@@ -31,14 +31,14 @@ using Numbers = std::vector<double>;
 constexpr int steps_of_body = 40;
 constexpr double energy_tolerance = 1e-10, momentum_tolerance = 1e-9;
 
-std::vector<std::uint8_t> held_end(const TetMesh& mesh) {
+std::vector<std::uint8_t> held_end(const tetrahedra::TetMesh& mesh) {
   std::vector<std::uint8_t> held;
   for (const Vec3& p : mesh.points)
     held.insert(held.end(), 3, p.x == 0 ? 1 : 0);
   return held;
 }
 
-double energy(const SolidMotion& body) {
+double energy(const integrator::SolidMotion& body) {
   return body.kinetic_energy() + body.potential_energy();
 }
 
@@ -46,7 +46,7 @@ struct Momentum {
   Vec3 sum;
   double size = 0; ///< of its parts
 };
-Momentum momentum(const SolidMotion& body) {
+Momentum momentum(const integrator::SolidMotion& body) {
   Momentum all;
   for (std::size_t i = 0; i < body.masses().size(); ++i) {
     const auto v = body.velocity().subspan(3 * i, 3);
@@ -65,9 +65,9 @@ struct Totals {
 /// A body with what acts on it.
 struct Thrown {
   Kind kind;
-  TetMesh mesh;
-  SolidMotionOptions options;
-  SolidMotion body;
+  tetrahedra::TetMesh mesh;
+  integrator::SolidMotionOptions options;
+  integrator::SolidMotion body;
   std::vector<std::uint8_t> held;
   Numbers load;
   double size = 0; ///< of forces on an axis
@@ -103,8 +103,8 @@ struct Thrown {
   }
 
 private:
-  static SolidMotionOptions some(Chance& chance, const Kind& kind) {
-    SolidMotionOptions options;
+  static integrator::SolidMotionOptions some(Chance& chance, const Kind& kind) {
+    integrator::SolidMotionOptions options;
     options.law = kind.law;
     options.drag = chance.one_in(3) ? chance.over_decades(0.1, 100) : 0;
     options.damping = chance.one_in(3) ? chance.over_decades(1e-4, 0.1) : 0;
@@ -112,13 +112,14 @@ private:
     options.max_rounds = 1 + static_cast<int>(chance.random() % 10);
     return options;
   }
-  Thrown(Chance& chance, const Kind& of, TetMesh shape, const SolidMotionOptions& with)
+  Thrown(Chance& chance, const Kind& of, tetrahedra::TetMesh shape,
+         const integrator::SolidMotionOptions& with)
       : Thrown(of, std::move(shape), with, chance.over_decades(1e2, 1e6),
                std::array{0.0, 0.3, 0.45, 0.49}.at(chance.random() % 4)) {}
-  Thrown(const Kind& of, TetMesh shape, const SolidMotionOptions& with, double young,
-         double poisson)
+  Thrown(const Kind& of, tetrahedra::TetMesh shape, const integrator::SolidMotionOptions& with,
+         double young, double poisson)
       : kind(of), mesh(std::move(shape)), options(with),
-        body(mesh, std::vector<SolidMaterial>{{young, poisson, 1e-3}}, options),
+        body(mesh, std::vector<fem::SolidMaterial>{{young, poisson, 1e-3}}, options),
         held(3 * mesh.points.size()), load(held.size()) {
     double mass = 0;
     for (const double m : body.masses())
@@ -132,7 +133,7 @@ private:
 void throw_body(std::uint32_t seed, Totals& totals) {
   Chance chance{std::mt19937(seed)};
   Thrown t(chance, kinds[seed % 64 == 63 ? 3 : seed % 3]); // the slow ones seldom
-  SolidMotion& body = t.body;
+  integrator::SolidMotion& body = t.body;
   ++totals.bodies;
   double h = chance.over_decades(1e-5, 1);
   for (int n = 0; n < (t.kind.slow() ? steps_of_body / 8 : steps_of_body); ++n) {
@@ -152,7 +153,7 @@ void throw_body(std::uint32_t seed, Totals& totals) {
     }
     const double before = energy(body);
     const Momentum was = momentum(body);
-    const SolidStep step = body.step(h, {});
+    const integrator::SolidStep step = body.step(h, {});
     ++totals.steps;
     totals.limited += step.limited ? 1 : 0;
     totals.unfinished += step.left <= t.options.tolerance ? 0 : 1;

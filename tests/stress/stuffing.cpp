@@ -21,7 +21,7 @@ namespace {
 
 using namespace gewebe;
 
-Grid scene(std::uint32_t seed) {
+volume::Grid random_scene(std::uint32_t seed) {
   switch (seed % 3) {
   case 0:
     return scenes::metaballs(12 + static_cast<int>(seed % 7), seed, 0.3 + seed % 5);
@@ -33,18 +33,18 @@ Grid scene(std::uint32_t seed) {
 }
 
 /// The same values on other axes.
-Grid turned(const Grid& grid, std::uint32_t seed) {
+volume::Grid turned(const volume::Grid& grid, std::uint32_t seed) {
   if (seed / 3 % 3 == 0)
     return grid;
-  GridInfo info = grid.info();
+  volume::GridInfo info = grid.info();
   if (seed / 3 % 3 == 1)
     info.transform.m = {0, -0.7, 0, 2, 0.7, 0, 0, -3, 0, 0, -0.7, 1};
   else
     info.transform.m = {0.5, 0.1, 0, 3, 0, 0.9, 0.05, -2, 0.02, 0, 1.4, 1};
-  GridBuilder builder(info);
-  for (const LeafView& leaf : grid.leaves())
+  volume::GridBuilder builder(info);
+  for (const volume::LeafView& leaf : grid.leaves())
     builder.share_leaf(grid, leaf);
-  for (const TileView& tile : grid.tiles())
+  for (const volume::TileView& tile : grid.tiles())
     builder.add_tile(tile);
   return builder.finish(false);
 }
@@ -55,7 +55,7 @@ struct Totals {
 };
 
 /// Two to four materials in cubes of `width` mm, by chance.
-MaterialSource materials(std::uint32_t seed, double width) {
+stuffing::MaterialSource materials(std::uint32_t seed, double width) {
   return [seed, width] {
     return [seed, width](const Vec3& place) -> std::int32_t {
       std::uint32_t hash = seed;
@@ -67,31 +67,31 @@ MaterialSource materials(std::uint32_t seed, double width) {
   };
 }
 
-void examine(const Grid& grid, double cell, std::uint32_t seed, Totals& totals) {
-  StuffingReport report;
-  StuffingOptions options{{}, cell, seed % (stuffing_grade_max + 1)};
+void examine(const volume::Grid& grid, double cell, std::uint32_t seed, Totals& totals) {
+  stuffing::StuffingReport report;
+  stuffing::StuffingOptions options{{}, cell, seed % (stuffing::stuffing_grade_max + 1)};
   if (seed / 4 % 2 != 0) {
     options.materials = materials(seed, cell * (1 + seed % 7));
     options.follow_interface = true;
   }
-  const TetMesh mesh = stuff({}, grid, options, &report);
+  const tetrahedra::TetMesh mesh = stuffing::stuff({}, grid, options, &report);
   ++totals.meshes;
   if (mesh.tetrahedra.empty()) {
     ++totals.empty;
     return;
   }
-  const TetReport found = examine_tetrahedra(mesh);
-  const TetBoundary surface = boundary(mesh);
-  const TetQuality quality = tet_quality(mesh, surface);
+  const tetrahedra::TetReport found = tetrahedra::examine_tetrahedra(mesh);
+  const tetrahedra::TetBoundary surface = tetrahedra::boundary(mesh);
+  const tetrahedra::TetQuality quality = tetrahedra::tet_quality(mesh, surface);
   bool first = surface.node.size() == report.surface_nodes;
   for (std::size_t n = 0; first && n < surface.node.size(); ++n)
     first = surface.node[n] == n;
   const bool good =
       found.sound() && found.unused_points.count == 0 && found.manifold_boundary() && first &&
       quality.smallest_volume > 0 &&
-      quality.smallest_angle >=
-          (options.follow_interface ? stuffing_interface_angle_min : stuffing_angle_min) &&
-      quality.largest_angle <= stuffing_angle_max;
+      quality.smallest_angle >= (options.follow_interface ? stuffing::stuffing_interface_angle_min
+                                                          : stuffing::stuffing_angle_min) &&
+      quality.largest_angle <= stuffing::stuffing_angle_max;
   if (!good) {
     ++totals.failed;
     std::printf("scene %u, cell %g: FAILED (angles %.3f to %.3f)\n", seed, cell,
@@ -109,7 +109,7 @@ void examine(const Grid& grid, double cell, std::uint32_t seed, Totals& totals) 
 int run(std::uint32_t scenes) {
   Totals totals;
   for (std::uint32_t seed = 0; seed < scenes; ++seed) {
-    const Grid grid = turned(scene(seed), seed);
+    const volume::Grid grid = turned(random_scene(seed), seed);
     const double voxel = std::cbrt(std::fabs(grid.info().transform.determinant()));
     std::mt19937 random(seed);
     const double factor = 1 + static_cast<double>(random()) / 4294967296.0;

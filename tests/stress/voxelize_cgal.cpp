@@ -14,12 +14,13 @@ using namespace gewebe;
 using namespace gewebe::test;
 
 /// Returns whether no voxel is wrong and no ray odd.
-bool check(const char* name, const TriangleMesh& mesh, const GridTransform& lattice) {
+bool check(const char* name, const TriangleMesh& mesh, const volume::GridTransform& lattice) {
   const CgalSide side(mesh, lattice);
-  VoxelizeReport report;
-  const InsideScan scan = scan_inside(Context{}, mesh, lattice, {}, &report);
+  voxelization::VoxelizeReport report;
+  const voxelization::InsideScan scan =
+      voxelization::scan_inside(Context{}, mesh, lattice, {}, &report);
   Int3 min{}, max{};
-  if (!index_range(lattice, bounding_box(mesh), min, max))
+  if (!volume::index_range(lattice, bounding_box(mesh), min, max))
     return false;
   for (std::size_t a = 0; a < 3; ++a) {
     --min[a];
@@ -46,9 +47,9 @@ int main(int argc, char** argv) {
       // CGAL is slow where cubes are large and says nothing new: their size decides
       if (size <= 16 || size % 16 == eighth)
         right &= check(nullptr, box_mesh(low, low + Vec3{1.0 * size, 1.0 * size, 1.0 * size}),
-                       uniform_transform(1));
+                       volume::uniform_transform(1));
     }
-  right &= check("bottle", thin_bottle(), uniform_transform(1));
+  right &= check("bottle", thin_bottle(), volume::uniform_transform(1));
   for (const char* name : {"sofa_liver_coarse.obj", "sofa_liver_smooth.obj",
                            "gca90_large_intestine_20k.stl", "hubmap_F_spleen_uv.obj"}) {
     const TriangleMesh mesh = load_test_mesh(name);
@@ -57,7 +58,7 @@ int main(int argc, char** argv) {
       continue;
     }
     for (int dim = 128; dim <= largest; dim *= 2)
-      right &= check(name, mesh, lattice_for_dim(bounding_box(mesh), dim));
+      right &= check(name, mesh, volume::lattice_for_dim(bounding_box(mesh), dim));
   }
   return right ? 0 : 1;
 }

@@ -13,7 +13,7 @@ namespace gewebe::test {
 /// voxelizer does.
 class CgalSide {
 public:
-  CgalSide(const TriangleMesh& mesh, const GridTransform& lattice)
+  CgalSide(const TriangleMesh& mesh, const volume::GridTransform& lattice)
       : surface_(surface_of(mesh, lattice)), side_(surface_) {}
 
   /// Faces that CGAL took; fewer than the mesh has where it isn't manifold.
@@ -24,7 +24,7 @@ private:
   using Kernel = CGAL::Exact_predicates_inexact_constructions_kernel;
   using Mesh = CGAL::Surface_mesh<Kernel::Point_3>;
 
-  static Mesh surface_of(const TriangleMesh& mesh, const GridTransform& lattice) {
+  static Mesh surface_of(const TriangleMesh& mesh, const volume::GridTransform& lattice) {
     Mesh surface;
     std::vector<Mesh::Vertex_index> vertex;
     for (const Vec3& point : mesh.points) {
@@ -43,23 +43,23 @@ private:
 /// Membership of single voxels.
 class ScanLookup {
 public:
-  explicit ScanLookup(const InsideScan& scan) : scan_(scan) {
+  explicit ScanLookup(const voxelization::InsideScan& scan) : scan_(scan) {
     for (std::size_t n = 0; n < scan.origins.size(); ++n)
       leaf_[scan.origins[n]] = n;
-    for (const TileView& t : scan.tiles)
-      (t.dim == leaf_dim ? tile_ : large_tile_).insert(t.origin);
+    for (const volume::TileView& t : scan.tiles)
+      (t.dim == volume::leaf_dim ? tile_ : large_tile_).insert(t.origin);
   }
   bool inside(const Int3& v) const {
-    const Int3 origin = leaf_origin(v);
+    const Int3 origin = volume::leaf_origin(v);
     if (const auto at = leaf_.find(origin); at != leaf_.end()) {
-      const int n = leaf_offset(v);
+      const int n = volume::leaf_offset(v);
       return (scan_.bits[at->second][static_cast<std::size_t>(n / 64)] >> (n % 64) & 1) != 0;
     }
     return tile_.contains(origin) || large_tile_.contains({v[0] & ~127, v[1] & ~127, v[2] & ~127});
   }
 
 private:
-  const InsideScan& scan_;
+  const voxelization::InsideScan& scan_;
   std::map<Int3, std::size_t> leaf_;
   std::set<Int3> tile_, large_tile_;
 };
@@ -77,8 +77,8 @@ struct SideCount {
 };
 
 /// All voxels of [min, max].
-inline SideCount compare_box(const CgalSide& side, const InsideScan& scan, const Int3& min,
-                             const Int3& max) {
+inline SideCount compare_box(const CgalSide& side, const voxelization::InsideScan& scan,
+                             const Int3& min, const Int3& max) {
   const ScanLookup lookup(scan);
   SideCount count;
   for (std::int32_t i = min[0]; i <= max[0]; ++i)

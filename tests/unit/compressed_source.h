@@ -20,11 +20,11 @@
 namespace gewebe::test {
 
 /// Columns of every `step`-th surface node, with rows for the surface.
-inline CompressedMade compressed_surface(const Model& model, double relative,
-                                         std::size_t step = 1) {
-  const StiffnessMatrix k = stiffness_matrix(model);
-  const Factor factor(k, {});
-  const std::size_t rows = surface_count(model);
+inline columns::CompressedMade compressed_surface(const model::Model& model, double relative,
+                                                  std::size_t step = 1) {
+  const linalg::StiffnessMatrix k = fem::stiffness_matrix(model);
+  const linalg::Factor factor(k, {});
+  const std::size_t rows = model::surface_count(model);
   std::vector<Vec3> positions;
   std::vector<std::uint32_t> nodes;
   for (std::uint32_t i = 0; i < rows; ++i) {
@@ -32,18 +32,21 @@ inline CompressedMade compressed_surface(const Model& model, double relative,
     if (i % step == 0)
       nodes.push_back(i);
   }
-  return compress_columns(positions, nodes, relative,
-                          [&](std::span<const std::uint32_t> of, ColumnSink& sink) {
-                            return compliance_columns(k, factor, stiffness_norm(k), of, {}, sink,
-                                                      rows);
-                          },
-                          {});
+  return columns::compress_columns(
+      positions, nodes, relative,
+      [&](std::span<const std::uint32_t> of, columns::ColumnSink& sink) {
+        return columns::compliance_columns(k, factor, linalg::stiffness_norm(k), of, {}, sink,
+                                           rows);
+      },
+      {});
 }
 
 /// Of these columns. \param model  outlives the source
-inline std::shared_ptr<ComplianceSource> compressed(const Model& model, CompressedMade made) {
-  return compliance_of_store({compressed_columns(std::move(made), model.nodes.size()),
-                              [&model] { return Factor(stiffness_matrix(model), Context{}); }});
+inline std::shared_ptr<compliance::ComplianceSource> compressed(const model::Model& model,
+                                                                columns::CompressedMade made) {
+  return compliance::compliance_of_store(
+      {columns::compressed_columns(std::move(made), model.nodes.size()),
+       [&model] { return linalg::Factor(fem::stiffness_matrix(model), Context{}); }});
 }
 
 } // namespace gewebe::test

@@ -36,13 +36,13 @@ inline double surface_distance(const collision::CollisionSurface& surface, std::
     search.find(surface, x, x, reach, allowed, near);
     double least = HUGE_VAL;
     const auto look = [&](const auto& pair, auto&& squared) {
-      std::array<Vec3, std::tuple_size_v<std::decay_t<decltype(pair)>>> corners;
+      std::array<gewebe::Vec3, std::tuple_size_v<std::decay_t<decltype(pair)>>> corners;
       for (std::size_t k = 0; k < corners.size(); ++k)
         corners[k] = x[pair[k]];
       least = smaller(least, squared(corners));
     };
     for (const auto& p : near.point_point)
-      look(p, [](const auto& c) { return dot(c[0] - c[1], c[0] - c[1]); });
+      look(p, [](const auto& c) { return gewebe::dot(c[0] - c[1], c[0] - c[1]); });
     for (const auto& p : near.point_edge)
       look(p, [](const auto& c) { return collision::point_edge_squared_distance(c); });
     for (const auto& p : near.edge_edge)
@@ -75,8 +75,8 @@ inline void add_surface(collision::CollisionSurface& all, std::vector<Vec3>& pla
 
 /// How deep the surface between nodes that can move is in an instrument, over its radius; below 0
 /// where it isn't. \param u 3 n displacements
-inline double surface_depth(const Model& model, std::span<const double> u,
-                            const InstrumentShape& shape, const Pose& pose) {
+inline double surface_depth(const model::Model& model, std::span<const double> u,
+                            const contact::InstrumentShape& shape, const contact::Pose& pose) {
   contact::BodySurface tissue;
   std::vector<Vec3> x;
   for (std::size_t i = 0; i < model.nodes.size(); ++i) {
@@ -84,8 +84,9 @@ inline double surface_depth(const Model& model, std::span<const double> u,
     x.push_back(model.nodes[i].position + Vec3{u[3 * i], u[3 * i + 1], u[3 * i + 2]});
   }
   for (const Triangle& t : model.triangles)
-    if (model.nodes[t[0]].fixed == fixed_none && model.nodes[t[1]].fixed == fixed_none &&
-        model.nodes[t[2]].fixed == fixed_none)
+    if (model.nodes[t[0]].fixed == model::fixed_none &&
+        model.nodes[t[1]].fixed == model::fixed_none &&
+        model.nodes[t[2]].fixed == model::fixed_none)
       tissue.triangles.push_back({t[0], t[1], t[2]});
   const contact::BodySurface tool = contact::instrument_surface(shape);
   std::vector<Vec3> corners;

@@ -10,20 +10,20 @@
 namespace gewebe::test {
 
 /// The operands live on: their leaves are shared.
-inline Grid combine(CsgOperation operation, const std::vector<Grid>& grids,
-                    CsgReport* report = nullptr, int threads = 1) {
-  std::vector<CsgOperand> operands;
-  for (const Grid& grid : grids)
+inline volume::Grid combine(volume::CsgOperation operation, const std::vector<volume::Grid>& grids,
+                            volume::CsgReport* report = nullptr, int threads = 1) {
+  std::vector<volume::CsgOperand> operands;
+  for (const volume::Grid& grid : grids)
     operands.push_back({grid, "volume " + std::to_string(operands.size())});
   Context context;
   context.threads = threads;
-  return csg(context, operation, std::move(operands), {}, report);
+  return volume::csg(context, operation, std::move(operands), {}, report);
 }
 
 /// Leaves and 8³ tiles drawn by chance in [-16, 16)³, values from `min` to `max`, a quarter of the
 /// leaves' values 0.
-inline Grid random_grid(std::mt19937& random, float min = -0.5f, float max = 1.5f) {
-  GridBuilder builder{GridInfo{}};
+inline volume::Grid random_grid(std::mt19937& random, float min = -0.5f, float max = 1.5f) {
+  volume::GridBuilder builder{volume::GridInfo{}};
   std::uniform_real_distribution<float> value(min, max);
   std::uniform_int_distribution<int> three(0, 2);
   std::vector<Int3> leaves;
@@ -40,8 +40,8 @@ inline Grid random_grid(std::mt19937& random, float min = -0.5f, float max = 1.5
         default:
           break;
         }
-  for (const LeafRef& leaf : builder.add_leaves(Context{}, leaves))
-    for (std::size_t n = 0; n < leaf_voxels; ++n) {
+  for (const volume::LeafRef& leaf : builder.add_leaves(Context{}, leaves))
+    for (std::size_t n = 0; n < volume::leaf_voxels; ++n) {
       leaf.values[n] = random() % 4 == 0 ? 0.0f : value(random);
       if (leaf.values[n] != 0)
         leaf.active[n / 64] |= std::uint64_t{1} << (n % 64);

@@ -15,16 +15,16 @@ namespace gewebe::test {
 
 /// A model cut from another, with the maps of nodes.
 struct HandCut {
-  Model model;
+  model::Model model;
   std::vector<std::uint32_t> origin, place;
 };
 
 /// Doubles some nodes and takes some springs out: most springs of a doubled node are shared out
 /// between it and its copy, some stay or go with it. Copies stand behind the surface nodes.
-inline HandCut hand_cut(const Model& model, std::size_t doubled, std::size_t removed,
+inline HandCut hand_cut(const model::Model& model, std::size_t doubled, std::size_t removed,
                         unsigned seed) {
   std::mt19937 engine(seed);
-  const auto surface = static_cast<std::uint32_t>(surface_count(model));
+  const auto surface = static_cast<std::uint32_t>(model::surface_count(model));
   std::vector<std::uint32_t> chosen;
   while (chosen.size() < doubled) {
     const auto node = static_cast<std::uint32_t>(engine() % surface);
@@ -34,14 +34,14 @@ inline HandCut hand_cut(const Model& model, std::size_t doubled, std::size_t rem
   std::sort(chosen.begin(), chosen.end());
   HandCut cut;
   cut.model = model;
-  Model& after = cut.model;
+  model::Model& after = cut.model;
   std::map<std::uint32_t, std::uint32_t> copy_of;
   for (std::uint32_t i = 0; i < model.nodes.size(); ++i) {
     cut.place.push_back(i < surface ? i : i + static_cast<std::uint32_t>(doubled));
     if (i < surface)
       cut.origin.push_back(i);
   }
-  std::vector<Node> copies;
+  std::vector<model::Node> copies;
   for (const std::uint32_t node : chosen) {
     copy_of[node] = surface + static_cast<std::uint32_t>(copies.size());
     copies.push_back(model.nodes[node]);
@@ -50,13 +50,13 @@ inline HandCut hand_cut(const Model& model, std::size_t doubled, std::size_t rem
   for (std::uint32_t i = surface; i < model.nodes.size(); ++i)
     cut.origin.push_back(i);
   after.nodes.insert(after.nodes.begin() + surface, copies.begin(), copies.end());
-  for (Node& node : after.nodes)
+  for (model::Node& node : after.nodes)
     if (node.central >= 0)
       node.central += static_cast<std::int32_t>(doubled);
   after.springs.clear();
-  for (const Spring& s : model.springs) {
+  for (const model::Spring& s : model.springs) {
     const auto add = [&](std::uint32_t i, std::uint32_t j, double share) {
-      Spring t = s;
+      model::Spring t = s;
       t.i = std::min(i, j);
       t.j = std::max(i, j);
       t.stiffness *= share;
@@ -78,9 +78,10 @@ inline HandCut hand_cut(const Model& model, std::size_t doubled, std::size_t rem
   for (std::size_t k = 0; k < removed; ++k)
     after.springs.erase(after.springs.begin() +
                         static_cast<std::ptrdiff_t>(engine() % after.springs.size()));
-  std::sort(after.springs.begin(), after.springs.end(), [](const Spring& a, const Spring& b) {
-    return std::tuple(a.kind, a.i, a.j) < std::tuple(b.kind, b.i, b.j);
-  });
+  std::sort(after.springs.begin(), after.springs.end(),
+            [](const model::Spring& a, const model::Spring& b) {
+              return std::tuple(a.kind, a.i, a.j) < std::tuple(b.kind, b.i, b.j);
+            });
   after.triangles.clear();
   after.texcoords.clear();
   after.normals.clear();

@@ -42,19 +42,20 @@ inline Particles random_particles(int count, double spread, double radius, const
 
 /// Largest |grid − exact density| over every `stride`-th voxel of every leaf; NaN where a value is
 /// NaN.
-inline double largest_leaf_error(const Grid& grid, const Particles& particles, int stride = 1) {
-  const GridTransform& transform = grid.info().transform;
+inline double largest_leaf_error(const volume::Grid& grid, const Particles& particles,
+                                 int stride = 1) {
+  const volume::GridTransform& transform = grid.info().transform;
   double error = 0;
   int phase = 0;
-  for (const LeafView& leaf : grid.leaves()) {
+  for (const volume::LeafView& leaf : grid.leaves()) {
     phase = (phase + 7) % stride;
-    for (int n = phase; n < leaf_voxels; n += stride) {
+    for (int n = phase; n < volume::leaf_voxels; n += stride) {
       const Vec3 index{1.0 * (leaf.origin[0] + (n >> 6)), 1.0 * (leaf.origin[1] + (n >> 3 & 7)),
                        1.0 * (leaf.origin[2] + (n & 7))};
       const long double exact = exact_density(particles, transform.to_world(index));
       const auto here =
           static_cast<double>(std::fabs(static_cast<long double>(leaf.values[n]) - exact));
-      error = larger(error, here);
+      error = numeric::larger(error, here);
     }
   }
   return error;

@@ -20,10 +20,10 @@ struct StressResult {
   bool passed() const { return error <= allowed && never_negative; }
 };
 
-inline Grid density_grid(const Particles& particles, double voxel) {
-  DensityOptions options;
-  options.info.transform = uniform_transform(voxel);
-  return metaball_density({}, particles, options);
+inline volume::Grid density_grid(const Particles& particles, double voxel) {
+  density::DensityOptions options;
+  options.info.transform = volume::uniform_transform(voxel);
+  return density::metaball_density({}, particles, options);
 }
 
 /// Offsets to 1e6 with R about 1.
@@ -66,8 +66,8 @@ inline StressResult stress_many(int count, double reach_count, int samples) {
       list.push_back({{side * unit(random), side * unit(random), side * unit(random)}, R, 1});
     return list;
   }();
-  const Grid grid = density_grid(particles, 0.2);
-  GridAccessor accessor(grid);
+  const volume::Grid grid = density_grid(particles, 0.2);
+  volume::GridAccessor accessor(grid);
   std::mt19937 random(14);
   double error = 0;
   bool never_negative = true;
@@ -101,7 +101,7 @@ inline StressResult stress_cancelling(int pairs) {
     particles.push_back({center + Vec3{1e-6, 0, 0}, R, -weight});
     total += 2 * weight;
   }
-  const Grid grid = density_grid(particles, 0.1);
+  const volume::Grid grid = density_grid(particles, 0.1);
   return {"cancelling weights", largest_leaf_error(grid, particles, 3) / total, 2e-6};
 }
 
@@ -118,11 +118,11 @@ inline StressResult stress_edge(int count) {
     const Vec3 x{1.0 * ijk[0], 1.0 * ijk[1], 1.0 * ijk[2]};
     const double t = 1 + 1e-7 * unit(random);
     const Particles particles{{center, norm(x - center) / std::sqrt(t), 1}};
-    const Grid grid = density_grid(particles, 1);
-    const auto value = static_cast<double>(GridAccessor(grid).value(ijk));
+    const volume::Grid grid = density_grid(particles, 1);
+    const auto value = static_cast<double>(volume::GridAccessor(grid).value(ijk));
     result.error = test::larger(result.error, value);
-    for (const LeafView& leaf : grid.leaves())
-      for (int m = 0; m < leaf_voxels; ++m)
+    for (const volume::LeafView& leaf : grid.leaves())
+      for (int m = 0; m < volume::leaf_voxels; ++m)
         result.never_negative = result.never_negative && leaf.values[m] >= 0;
   }
   return result;

@@ -24,7 +24,7 @@ inline constexpr const char* next_client = "# the next client";
 
 /// What the file of shared shapes holds; nobody writes it meanwhile.
 struct SharedContent {
-  SharedFrame head;
+  formats::SharedFrame head;
   std::map<std::string, std::vector<double>> positions;
   std::string fault;
 };
@@ -32,7 +32,7 @@ inline SharedContent shared_content(const std::string& path) {
   SharedContent out;
   std::ifstream file(path, std::ios::binary);
   const std::string bytes{std::istreambuf_iterator<char>(file), {}};
-  SharedHead head;
+  formats::SharedHead head;
   const auto load = [&](auto& value, std::size_t offset) {
     const bool there = offset <= bytes.size() && sizeof value <= bytes.size() - offset;
     if (there)
@@ -43,14 +43,14 @@ inline SharedContent shared_content(const std::string& path) {
   };
   if (!load(head, 0) || head.sequence == 0)
     return out;
-  const SharedPlace place = head.sequence % 2 == 1 ? head.odd : head.even;
+  const formats::SharedPlace place = head.sequence % 2 == 1 ? head.odd : head.even;
   if (!load(out.head, place.offset))
     return out;
   if (out.head.sequence != head.sequence || head.begun != head.sequence ||
       out.head.bytes > place.bytes || place.offset + place.bytes > bytes.size())
     out.fault = "frame " + std::to_string(head.sequence) + " of shapes is not in its place";
   for (std::size_t k = 0; out.fault.empty() && k < out.head.objects; ++k) {
-    SharedObject object;
+    formats::SharedObject object;
     if (!load(object, place.offset + sizeof out.head + k * sizeof object))
       return out;
     if (object.positions + 24 * object.nodes > out.head.bytes ||
@@ -132,8 +132,9 @@ private:
       }
       for (std::size_t k = 0; k < count && std::getline(lines, row); ++k) {
         const std::vector<double>& all = found->second;
-        const std::string place = number_text(all[3 * k]) + " " + number_text(all[3 * k + 1]) +
-                                  " " + number_text(all[3 * k + 2]);
+        const std::string place = text::number_text(all[3 * k]) + " " +
+                                  text::number_text(all[3 * k + 1]) + " " +
+                                  text::number_text(all[3 * k + 2]);
         if (row != place)
           fault = "node " + std::to_string(k) + " of " + name + " is shared at " + place +
                   " and answered at " + row;

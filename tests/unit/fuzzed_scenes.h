@@ -44,36 +44,37 @@ namespace gewebe::test {
 
 /// The models by name: held balls, a sheet, a tube, a ball that nothing holds, a shell, two masses,
 /// solids of quadratic and of linear elements, the latter free.
-inline const std::map<std::string, Model>& fuzzed_models() {
-  static const std::map<std::string, Model> models = [] {
-    std::map<std::string, Model> all;
+inline const std::map<std::string, model::Model>& fuzzed_models() {
+  static const std::map<std::string, model::Model> models = [] {
+    std::map<std::string, model::Model> all;
     const auto built = [](const TriangleMesh& mesh, std::int32_t centrals) {
-      BuildOptions options;
+      model::BuildOptions options;
       options.bend = true;
       options.centrals = centrals;
-      return build_model(mesh, options, Context{}).model;
+      return model::build_model(mesh, options, Context{}).model;
     };
     all["organ"] = organ(1);
     all["ball"] = organ(2);
     all["shell"] = shell();
     all["two"] = two_masses();
     all["free"] = built(ball(2, 12), 0);
-    Model& sheet_model = all["sheet"] = built(sheet(5, 4, 6), 0);
-    for (Node& n : sheet_model.nodes)
-      n.fixed = n.position.x < 1 ? fixed_all : fixed_none;
-    Model& tube = all["tube"] = built(primitive_mesh({PrimitiveShape::tube, 8, 6, 10, 40}), 1);
-    for (Node& n : tube.nodes)
+    model::Model& sheet_model = all["sheet"] = built(sheet(5, 4, 6), 0);
+    for (model::Node& n : sheet_model.nodes)
+      n.fixed = n.position.x < 1 ? model::fixed_all : model::fixed_none;
+    model::Model& tube = all["tube"] =
+        built(model::primitive_mesh({model::PrimitiveShape::tube, 8, 6, 10, 40}), 1);
+    for (model::Node& n : tube.nodes)
       if (n.position.z < 1 || n.position.z > 39)
-        n.fixed = fixed_all;
+        n.fixed = model::fixed_all;
     for (const bool quadratic : {true, false}) {
-      SolidModelOptions options;
+      fem::SolidModelOptions options;
       options.material.materials = {{"gel", 1e-3, 2e4, 1, 0.2, 0.4}};
       options.quadratic = quadratic;
-      Model& solid = all[quadratic ? "gel" : "loaf"] =
-          solid_model(box_tetrahedra(3, 1, 1, 8), options, {});
-      for (Node& n : solid.nodes)
+      model::Model& solid = all[quadratic ? "gel" : "loaf"] =
+          fem::solid_model(box_tetrahedra(3, 1, 1, 8), options, {});
+      for (model::Node& n : solid.nodes)
         if (n.position.x < 1 && quadratic)
-          n.fixed = fixed_all;
+          n.fixed = model::fixed_all;
     }
     for (auto& [name, model] : all)
       model.name = name;
@@ -124,14 +125,14 @@ private:
   void line(const std::string& text) { lines_.push_back(text); }
 
   static std::string numbers(const Vec3& v) {
-    return number_text(v.x) + " " + number_text(v.y) + " " + number_text(v.z);
+    return text::number_text(v.x) + " " + text::number_text(v.y) + " " + text::number_text(v.z);
   }
   Vec3 vector(double size) { return {real(-size, size), real(-size, size), real(-size, size)}; }
   /// Seldom what no scene should hold.
   std::string number(double size) {
     static const std::vector<std::string> odd{"1e300",  "-1e300", "1e38", "1e30",
                                               "1e-300", "0",      "-0"};
-    return one_in(40) ? of(odd) : number_text(real(-size, size));
+    return one_in(40) ? of(odd) : text::number_text(real(-size, size));
   }
   std::string triple(double size) {
     const std::string x = number(size), y = number(size);
@@ -139,7 +140,7 @@ private:
   }
   std::string time() {
     static const std::vector<double> usual{0.001, 0.002, 0.004, 0.01, 0.0015};
-    return one_in(60) ? number(1) : number_text(of(usual));
+    return one_in(60) ? number(1) : text::number_text(of(usual));
   }
 
   void add_object() {
@@ -153,7 +154,7 @@ private:
     std::string text = "object " + name + " " + model;
     if (filled) {
       text += std::string(" integration=") + (one_in(2) ? "implicit" : "auto") +
-              " bulk=" + number_text(one_in(10) ? 1e12 : real(1, 3e6));
+              " bulk=" + text::number_text(one_in(10) ? 1e12 : real(1, 3e6));
     } else {
       if (one_in(2))
         text += " store=" + model;
@@ -163,7 +164,7 @@ private:
     }
     if (!fuzzed_models().at(model).tetrahedra.empty() || one_in(20)) {
       text += one_in(3) ? " law=neo-hookean" : "";
-      text += one_in(3) ? " damping=" + number_text(real(0, 1)) + "@30" : "";
+      text += one_in(3) ? " damping=" + text::number_text(real(0, 1)) + "@30" : "";
       text += one_in(5) ? " tolerance=1e-5" : "";
     }
     objects_.push_back({name, &fuzzed_models().at(model)});
@@ -174,7 +175,7 @@ private:
 
   struct Known {
     std::string name;
-    const Model* model = nullptr;
+    const model::Model* model = nullptr;
   };
   /// Seldom the name of what has come off.
   Known object() {
@@ -183,15 +184,15 @@ private:
       one.name += ".1";
     return one;
   }
-  Vec3 place(const Model& model) { return of(model.nodes).position; }
-  static double size_of(const Model& model) {
+  Vec3 place(const model::Model& model) { return of(model.nodes).position; }
+  static double size_of(const model::Model& model) {
     Box3 box;
-    for (const Node& n : model.nodes)
+    for (const model::Node& n : model.nodes)
       box.add(n.position);
     return box.longest_side();
   }
 
-  std::string nodes(const Model& model) {
+  std::string nodes(const model::Model& model) {
     const auto node = [&] { return std::to_string(below(model.nodes.size())); };
     const Vec3 p = place(model);
     const double size = size_of(model);
@@ -202,12 +203,12 @@ private:
       return one_in(2) ? "all" : "@list";
     case 2:
       return std::string(1, "xyz"[below(3)]) + (one_in(2) ? "<" : ">") +
-             number_text(p[static_cast<int>(below(3))]);
+             text::number_text(p[static_cast<int>(below(3))]);
     case 3:
-      return "sphere:" + number_text(p.x) + "," + number_text(p.y) + "," + number_text(p.z) + "," +
-             number_text(real(0.05, 0.5) * size);
+      return "sphere:" + text::number_text(p.x) + "," + text::number_text(p.y) + "," +
+             text::number_text(p.z) + "," + text::number_text(real(0.05, 0.5) * size);
     case 4:
-      return "\"" + node() + " or not (x<" + number_text(p.x) + ")\"";
+      return "\"" + node() + " or not (x<" + text::number_text(p.x) + ")\"";
     case 5:
       return node() + "-" + std::to_string(model.nodes.size() - 1);
     case 6:
@@ -233,13 +234,13 @@ private:
     if (one_in(3))
       return new_instrument("k") + " blade " + (one_in(20) ? triple(1e300) : numbers(at)) + " " +
              numbers(at + vector(size));
-    const std::string friction = one_in(2) ? " friction " + number_text(real(0, 1.5)) : "";
+    const std::string friction = one_in(2) ? " friction " + text::number_text(real(0, 1.5)) : "";
     if (one_in(4))
       return new_instrument("j") + " mesh jaw" + std::to_string(1 + below(4)) + ".ply" +
-             (one_in(2) ? " radius=" + number_text(real(0.01, 0.2) * size) : "") + " " +
+             (one_in(2) ? " radius=" + text::number_text(real(0.01, 0.2) * size) : "") + " " +
              numbers(at) + (one_in(2) ? " turn " + numbers(vector(1)) + " " + number(180) : "") +
              friction;
-    const std::string radius = one_in(30) ? number(1e3) : number_text(real(0.05, 0.4) * size);
+    const std::string radius = one_in(30) ? number(1e3) : text::number_text(real(0.05, 0.4) * size);
     if (one_in(2))
       return new_instrument("q") + " capsule " + radius + " " + numbers(at) + " " +
              numbers(at + vector(0.5 * size)) + friction;
@@ -275,7 +276,7 @@ private:
     if (one_in(3))
       return "restore " + o.name;
     if (one_in(4))
-      return "tear " + o.name + " " + number_text(real(0, 0.3));
+      return "tear " + o.name + " " + text::number_text(real(0, 0.3));
     if (one_in(o.model->tetrahedra.empty() ? 3 : 20))
       return "cut " + o.name + " springs " + nodes(*o.model) +
              (one_in(2) ? " " + nodes(*o.model) : "");
@@ -284,8 +285,8 @@ private:
   }
   std::string two_step(const Known& o) {
     const double threshold = one_in(2) ? real(1, 1e4) : real(1e3, 1e6);
-    return "two-step " + o.name + " " + number_text(threshold) + (one_in(2) ? " series" : "") +
-           (one_in(2) ? " stage=" + o.model->name + ".stiff" : "");
+    return "two-step " + o.name + " " + text::number_text(threshold) +
+           (one_in(2) ? " series" : "") + (one_in(2) ? " stage=" + o.model->name + ".stiff" : "");
   }
   std::string question() {
     const Known o = object();
@@ -313,8 +314,8 @@ private:
     case 3:
       return one_in(2)   ? "withdraw " + instrument()
              : one_in(5) ? "couple " + instrument() + " off"
-                         : "couple " + instrument() + " " + number_text(real(1, 1e6)) +
-                               (one_in(2) ? " " + number_text(real(0, 1e4)) : "");
+                         : "couple " + instrument() + " " + text::number_text(real(1, 1e6)) +
+                               (one_in(2) ? " " + text::number_text(real(0, 1e4)) : "");
     case 14:
       return "grasp " + o.name + " " + nodes(*o.model) + " " + instrument();
     case 4:
@@ -324,10 +325,10 @@ private:
       return "method " + o.name + (one_in(2) ? " ffe" : " ela");
     case 7:
       return "attach " + o.name + " " + nodes(*o.model) + " " + other.name + " " +
-             nodes(*other.model) + " " + number_text(real(10, 5e4));
+             nodes(*other.model) + " " + text::number_text(real(10, 5e4));
     case 8:
       return one_in(3)   ? "gravity " + triple(1e4)
-             : one_in(4) ? "timestep " + number_text(of(std::vector{1e-3, 2e-4, 1e-300}))
+             : one_in(4) ? "timestep " + text::number_text(of(std::vector{1e-3, 2e-4, 1e-300}))
                          : two_step(o);
     default:
       return load();
@@ -349,21 +350,22 @@ private:
     const std::string one = name(), other = contacts_() % 3 == 0 ? "self" : name();
     return "contact " + one + " " + other + (contacts_() % 4 == 0 ? " separate" : "") +
            (contacts_() % 2 == 0
-                ? " friction " + number_text(static_cast<double>(contacts_() % 100) / 50)
+                ? " friction " + text::number_text(static_cast<double>(contacts_() % 100) / 50)
                 : "");
   }
   /// As well.
   std::string mass() {
     const Known& o = objects_[masses_() % objects_.size()];
     const auto node = [&] { return std::to_string(masses_() % o.model->nodes.size()); };
-    const std::string grams =
-        masses_() % 40 == 0 ? "1e30" : number_text(static_cast<double>(masses_() % 2000) / 1000);
+    const std::string grams = masses_() % 40 == 0
+                                  ? "1e30"
+                                  : text::number_text(static_cast<double>(masses_() % 2000) / 1000);
     return "mass " + o.name + " " + node() + "," + node() + " " + grams +
            (masses_() % 3 == 0 ? " each" : "");
   }
   void command() {
     if (masses_() % 16 == 0)
-      line((masses_() % 4 == 0 ? "at " + number_text(now_ + 0.0015) + " " : "") + mass());
+      line((masses_() % 4 == 0 ? "at " + text::number_text(now_ + 0.0015) + " " : "") + mass());
     if (contacts_() % 8 == 0)
       line(contact());
     if (one_in(6))
@@ -380,8 +382,8 @@ private:
     } else if (one_in(50) && objects_.size() < 5) {
       add_object();
     } else if (one_in(5)) {
-      line("at " + number_text(now_ + of(std::vector{0.001, 0.003, 0.0005, 0.01, -0.002})) + " " +
-           change());
+      line("at " + text::number_text(now_ + of(std::vector{0.001, 0.003, 0.0005, 0.01, -0.002})) +
+           " " + change());
     } else if (one_in(8)) {
       line("at every " + time() + " " + change());
     } else {
@@ -392,13 +394,14 @@ private:
     static const std::vector<double> usual{0.001, 0.002, 0.0025, 0.005, 0};
     if (one_in(12)) {
       now_ += 0.004;
-      line("run " + number_text(now_) + " every " + number_text(of(std::vector{0.001, 0.0015})));
+      line("run " + text::number_text(now_) + " every " +
+           text::number_text(of(std::vector{0.001, 0.0015})));
     } else if (one_in(40)) {
       line("step " + number(1e-3));
     } else {
       const double dt = of(usual);
       now_ += dt;
-      line("step " + number_text(dt));
+      line("step " + text::number_text(dt));
     }
   }
 
@@ -460,7 +463,7 @@ inline std::vector<std::string> failing_scene(std::uint64_t seed) {
     case 3: // a cut that can't be, now and in a step
       lines.insert(lines.end(),
                    {"cut " + o + " plane 900 0 0 1 0 0",
-                    "at " + number_text(1e-9) + " cut " + o + " plane 900 0 0 1 0 0",
+                    "at " + text::number_text(1e-9) + " cut " + o + " plane 900 0 0 1 0 0",
                     "at every 0.0005 cut " + o + " plane 900 0 0 1 0 0", "step 0.001"});
       break;
     case 4: // lines that are none
@@ -477,18 +480,20 @@ inline std::vector<std::string> failing_scene(std::uint64_t seed) {
 }
 
 /// Digests what a result is told, and notes what no result may be told.
-class CheckedResult final : public ResultWriter {
+class CheckedResult final : public formats::ResultWriter {
 public:
-  void add_object(const std::string& name, const Model& model) override {
+  void add_object(const std::string& name, const model::Model& model) override {
     add(name, model, "object");
   }
-  void add_part(const std::string& name, const Model& model) override { add(name, model, "part"); }
-  void change_object(std::size_t object, const Model& model,
+  void add_part(const std::string& name, const model::Model& model) override {
+    add(name, model, "part");
+  }
+  void change_object(std::size_t object, const model::Model& model,
                      std::span<const std::uint32_t> origin) override {
     nodes_.at(object) = model.nodes.size();
     digest_.add_bytes(origin.data(), origin.size_bytes());
   }
-  void add_frame(double time, std::span<const FrameObject> objects) override {
+  void add_frame(double time, std::span<const formats::FrameObject> objects) override {
     digest_.add(time);
     if (objects.size() != nodes_.size())
       fault = "a frame of " + std::to_string(objects.size()) + " objects";
@@ -498,12 +503,13 @@ public:
       digest_.add(objects[i].displacement);
       for (const double u : objects[i].displacement)
         if (!std::isfinite(static_cast<float>(u)))
-          fault = "a displacement of " + number_text(u);
-      for (const NodeVector& f : objects[i].forces) {
+          fault = "a displacement of " + text::number_text(u);
+      for (const contact::NodeVector& f : objects[i].forces) {
         digest_.add(std::uint64_t{f.node});
         digest_.add_bytes(&f.value, sizeof f.value);
         if (f.node >= nodes_[i] || !std::isfinite(static_cast<float>(norm(f.value))))
-          fault = "a force of " + number_text(norm(f.value)) + " at " + std::to_string(f.node);
+          fault =
+              "a force of " + text::number_text(norm(f.value)) + " at " + std::to_string(f.node);
       }
     }
     ++frames;
@@ -515,7 +521,7 @@ public:
   std::size_t frames = 0;
 
 private:
-  void add(const std::string& name, const Model& model, std::string_view what) {
+  void add(const std::string& name, const model::Model& model, std::string_view what) {
     nodes_.push_back(model.nodes.size());
     digest_.add_bytes(name.data(), name.size());
     digest_.add_bytes(what.data(), what.size());
@@ -525,29 +531,29 @@ private:
   std::vector<std::size_t> nodes_;
 };
 
-inline void stiffen(Model& model, double by) {
-  for (Spring& s : model.springs)
+inline void stiffen(model::Model& model, double by) {
+  for (model::Spring& s : model.springs)
     s.stiffness *= by;
   if (!model.tetrahedra.empty())
     model.materials[0].young *= by;
 }
 
 /// Stores of the models, and of a second stage four times as stiff.
-inline StoredStiffness fuzzed_store(const std::string& name, double stiffer) {
+inline compliance::StoredStiffness fuzzed_store(const std::string& name, double stiffer) {
   struct Kept {
-    StiffnessMatrix matrix;
-    FactorData data;
+    linalg::StiffnessMatrix matrix;
+    linalg::FactorData data;
     std::vector<std::uint32_t> surface;
   };
   static std::map<std::pair<std::string, double>, std::shared_ptr<Kept>> all;
   std::shared_ptr<Kept>& kept = all[{name, stiffer}];
   if (!kept) {
-    Model model = fuzzed_models().at(name);
+    model::Model model = fuzzed_models().at(name);
     stiffen(model, stiffer);
     auto made = std::make_shared<Kept>();
-    made->matrix = stiffness_matrix(model);
-    made->data = Factor(made->matrix, Context{}).data();
-    for (std::uint32_t i = 0; i < surface_count(model); i += 2)
+    made->matrix = fem::stiffness_matrix(model);
+    made->data = linalg::Factor(made->matrix, Context{}).data();
+    for (std::uint32_t i = 0; i < model::surface_count(model); i += 2)
       made->surface.push_back(i);
     kept = std::move(made);
   }
@@ -576,27 +582,27 @@ inline FuzzedRun run_fuzzed(const std::vector<std::string>& lines, const FuzzedO
   const bool serve = how.serve, shares = how.serve && how.shown;
   const auto base = [](const std::string& name) { return name.substr(name.find_last_of('/') + 1); };
   CheckedResult result;
-  SceneOptions options;
+  cli::SceneOptions options;
   options.files.model = [&](const std::string& name) {
     const std::string file = base(name), stiff = ".stiff";
     if (!file.ends_with(stiff))
       return fuzzed_models().at(file);
-    Model model = fuzzed_models().at(file.substr(0, file.size() - stiff.size()));
+    model::Model model = fuzzed_models().at(file.substr(0, file.size() - stiff.size()));
     stiffen(model, 4);
     return model;
   };
-  options.files.store = [&](const std::string& name, const Model&) {
+  options.files.store = [&](const std::string& name, const model::Model&) {
     return fuzzed_store(base(name), 1);
   };
-  options.files.second_stage = [&](const std::string& name, const Model&) {
-    return [file = base(name)] { return compliance_of_store(fuzzed_store(file, 4)); };
+  options.files.second_stage = [&](const std::string& name, const model::Model&) {
+    return [file = base(name)] { return compliance::compliance_of_store(fuzzed_store(file, 4)); };
   };
-  options.files.instrument = [&](const std::string& name, InstrumentShape shape) {
+  options.files.instrument = [&](const std::string& name, contact::InstrumentShape shape) {
     const int kind = base(name)[3] - '0';
     TriangleMesh mesh = kind < 3 ? divided_box({8, 4, 0.5 + kind}, 2) : sphere_mesh(1, 5, {});
     if (kind == 4) // dented
       mesh.points[0] *= 0.5;
-    shape.core = std::make_shared<const ConvexCore>(mesh);
+    shape.core = std::make_shared<const contact::ConvexCore>(mesh);
     if (!(shape.radius > 0))
       shape.radius = shape.core->size() / 100;
     return shape;
@@ -610,18 +616,18 @@ inline FuzzedRun run_fuzzed(const std::vector<std::string>& lines, const FuzzedO
       door.reply(text);
   };
   options.serve = options.acknowledge = serve;
-  const auto shared = shares ? std::make_unique<SharedShapes>(shapes) : nullptr;
+  const auto shared = shares ? std::make_unique<formats::SharedShapes>(shapes) : nullptr;
   options.shared = shared.get();
   options.measure = how.measure;
   options.measure_error = how.verify;
   options.tolerance = how.tolerance;
   options.result = how.shown ? &result : nullptr;
   options.warn = [](const std::string&) {};
-  std::optional<SceneRecord> log;
+  std::optional<cli::SceneRecord> log;
   if (!how.record.empty())
-    options.record = &log.emplace(how.record, Output::Options{}, "-");
+    options.record = &log.emplace(how.record, formats::Output::Options{}, "-");
   const ScratchFile table(".csv");
-  EventLog events(table.path(), Output::Options{.binary = false});
+  cli::EventLog events(table.path(), formats::Output::Options{.binary = false});
   options.events = &events;
   Context context;
   context.threads = how.threads;
@@ -632,7 +638,7 @@ inline FuzzedRun run_fuzzed(const std::vector<std::string>& lines, const FuzzedO
   context.cancelled = [&, end] {
     return asked.fetch_add(1, std::memory_order_relaxed) % 32 == 0 && std::clock() > end;
   };
-  SceneRun run("fuzz", context, options);
+  cli::SceneRun run("fuzz", context, options);
   try {
     for (const std::string& line : lines) {
       if (run.ended())

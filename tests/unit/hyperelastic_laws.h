@@ -11,24 +11,24 @@
 
 namespace gewebe::test {
 
-inline constexpr HyperelasticLaw stable_neo_hookean{},
-    neo_hookean{HyperelasticLaw::neo_hookean, {}};
+inline constexpr model::HyperelasticLaw stable_neo_hookean{},
+    neo_hookean{model::HyperelasticLaw::neo_hookean, {}};
 
 /// In modified invariants.
-inline constexpr std::array<HyperelasticLaw, 8> modified_laws{{
-    {HyperelasticLaw::mooney_rivlin, {}},
-    {HyperelasticLaw::mooney_rivlin, {0.2}},
-    {HyperelasticLaw::yeoh, {0.1, 0.05}},
-    {HyperelasticLaw::yeoh, {-0.04, 0.02}},
-    {HyperelasticLaw::ogden, {7}},
-    {HyperelasticLaw::ogden, {-3.5}},
-    {HyperelasticLaw::ogden, {1.3}},
-    {HyperelasticLaw::ogden, {5, -2.6, 0.4}},
+inline constexpr std::array<model::HyperelasticLaw, 8> modified_laws{{
+    {model::HyperelasticLaw::mooney_rivlin, {}},
+    {model::HyperelasticLaw::mooney_rivlin, {0.2}},
+    {model::HyperelasticLaw::yeoh, {0.1, 0.05}},
+    {model::HyperelasticLaw::yeoh, {-0.04, 0.02}},
+    {model::HyperelasticLaw::ogden, {7}},
+    {model::HyperelasticLaw::ogden, {-3.5}},
+    {model::HyperelasticLaw::ogden, {1.3}},
+    {model::HyperelasticLaw::ogden, {5, -2.6, 0.4}},
 }};
 
 /// dW/ds_i of principal stretches s, W with all of the volume's energy: the isochoric part by
 /// W' (s'_i), s'_i = J^(-1/3) s_i, and K/2 (J - 1)².
-inline Eigen::Vector3d principal_stress(const HyperelasticLaw& law, const Elasticity& m,
+inline Eigen::Vector3d principal_stress(const model::HyperelasticLaw& law, const fem::Elasticity& m,
                                         const Eigen::Vector3d& s) {
   const double mu = m.mu, k = m.lambda + 2 * mu / 3, j = s.prod();
   const Eigen::Vector3d t = s / std::cbrt(j);
@@ -36,11 +36,11 @@ inline Eigen::Vector3d principal_stress(const HyperelasticLaw& law, const Elasti
   const double x = t.squaredNorm() - 3;
   for (int i = 0; i < 3; ++i)
     switch (law.kind) {
-    case HyperelasticLaw::mooney_rivlin:
+    case model::HyperelasticLaw::mooney_rivlin:
       slope[i] =
           (1 - 2 * law.parameter[0]) * mu * t[i] * t[i] - 2 * law.parameter[0] * mu / (t[i] * t[i]);
       break;
-    case HyperelasticLaw::yeoh:
+    case model::HyperelasticLaw::yeoh:
       slope[i] =
           2 * t[i] * t[i] * mu * (0.5 + 2 * law.parameter[0] * x + 3 * law.parameter[1] * x * x);
       break;
@@ -55,13 +55,13 @@ inline Eigen::Vector3d principal_stress(const HyperelasticLaw& law, const Elasti
 }
 
 /// First Piola-Kirchhoff stress by the definitions of the laws. \pre det F > 0
-inline Eigen::Matrix3d first_piola(const HyperelasticLaw& law, const Elasticity& m,
+inline Eigen::Matrix3d first_piola(const model::HyperelasticLaw& law, const fem::Elasticity& m,
                                    const Eigen::Matrix3d& f) {
   const double j = f.determinant(), i_c = f.squaredNorm();
   const Eigen::Matrix3d cofactor = j * f.inverse().transpose();
-  if (law.kind == HyperelasticLaw::neo_hookean)
+  if (law.kind == model::HyperelasticLaw::neo_hookean)
     return m.mu * (f - cofactor / j) + m.lambda * (j - 1) * cofactor;
-  if (law.kind == HyperelasticLaw::stable_neo_hookean) {
+  if (law.kind == model::HyperelasticLaw::stable_neo_hookean) {
     const double mu = 4.0 / 3 * m.mu, lambda = m.lambda + 5.0 / 6 * m.mu,
                  alpha = 1 + mu / lambda - mu / (4 * lambda);
     return mu * (1 - 1 / (i_c + 1)) * f + lambda * (j - alpha) * cofactor;

@@ -5,7 +5,7 @@
 
 namespace gewebe::test {
 
-using gewebe::larger;
-using gewebe::smaller;
+using gewebe::numeric::larger;
+using gewebe::numeric::smaller;
 
 } // namespace gewebe::test

@@ -17,15 +17,16 @@
 
 namespace gewebe::test {
 
-inline AxesSolve solver(const Model& model) {
-  auto axes = std::make_shared<AxisSolver>(factorise_axes(model, Context{}));
+inline update::AxesSolve solver(const model::Model& model) {
+  auto axes =
+      std::make_shared<compliance::AxisSolver>(compliance::factorise_axes(model, Context{}));
   return [axes](std::span<double> f, std::size_t columns) { axes->solve(f, columns); };
 }
 
 /// Columns of some nodes by a solver, as float32 if asked.
-class Made final : public ColumnSource {
+class Made final : public columns::ColumnSource {
 public:
-  Made(const Model& model, const AxesSolve& solve, std::vector<std::uint32_t> nodes,
+  Made(const model::Model& model, const update::AxesSolve& solve, std::vector<std::uint32_t> nodes,
        bool single = false)
       : count_(model.nodes.size()), nodes_(std::move(nodes)), single_(single) {
     for (const std::uint32_t node : nodes_) {
@@ -53,7 +54,7 @@ private:
 };
 
 /// Every so many-th node.
-inline std::vector<std::uint32_t> every(std::uint32_t step, const Model& model) {
+inline std::vector<std::uint32_t> every(std::uint32_t step, const model::Model& model) {
   std::vector<std::uint32_t> nodes;
   for (std::uint32_t i = 0; i < model.nodes.size(); i += step)
     nodes.push_back(i);
@@ -61,10 +62,10 @@ inline std::vector<std::uint32_t> every(std::uint32_t step, const Model& model) 
 }
 
 /// A ball of which some nodes are held, wholly or along z.
-inline Model organ_ball(int rounds = 3) {
-  Model model = model_of(ball(rounds, 20));
-  for (std::size_t i = 0; i < surface_count(model); i += 17)
-    model.nodes[i].fixed = i % 2 == 0 ? fixed_all : fixed_z;
+inline model::Model organ_ball(int rounds = 3) {
+  model::Model model = model_of(ball(rounds, 20));
+  for (std::size_t i = 0; i < model::surface_count(model); i += 17)
+    model.nodes[i].fixed = i % 2 == 0 ? model::fixed_all : model::fixed_z;
   return model;
 }
 

@@ -30,7 +30,7 @@ TriangleMesh load_test_mesh(const std::string& name) {
           mesh.triangles.push_back({face[0], face[c - 1], face[c]});
       }
     }
-    weld(mesh, {}); // seams of texture coordinates
+    repair::weld(mesh, {}); // seams of texture coordinates
     return mesh;
   }
   const std::string bytes((std::istreambuf_iterator<char>(file)), {});

@@ -72,14 +72,14 @@ inline void rotate(TriangleMesh& mesh, double angle) {
 }
 
 /// All voxels inside, read from bits and tiles.
-inline std::set<Int3> inside_voxels(const InsideScan& scan) {
+inline std::set<Int3> inside_voxels(const voxelization::InsideScan& scan) {
   std::set<Int3> inside;
   for (std::size_t n = 0; n < scan.origins.size(); ++n)
-    for (std::int32_t v = 0; v < leaf_voxels; ++v)
+    for (std::int32_t v = 0; v < volume::leaf_voxels; ++v)
       if ((scan.bits[n][static_cast<std::size_t>(v / 64)] >> (v % 64) & 1) != 0)
         inside.insert({scan.origins[n][0] + v / 64, scan.origins[n][1] + v / 8 % 8,
                        scan.origins[n][2] + v % 8});
-  for (const TileView& t : scan.tiles)
+  for (const volume::TileView& t : scan.tiles)
     for (std::int32_t i = 0; i < t.dim; ++i)
       for (std::int32_t j = 0; j < t.dim; ++j)
         for (std::int32_t k = 0; k < t.dim; ++k)

@@ -24,8 +24,8 @@ struct Overlap {
   double nodes = 0, edges = 0;
 
   void add(const Overlap& o) {
-    nodes = larger(nodes, o.nodes);
-    edges = larger(edges, o.edges);
+    nodes = numeric::larger(nodes, o.nodes);
+    edges = numeric::larger(edges, o.edges);
   }
 };
 
@@ -54,7 +54,8 @@ namespace overlap {
 
 inline double distance(const TriangleMesh& mesh, const Triangle& t, const Vec3& p) {
   return norm(
-      p - nearest_on_triangle(p, mesh.points[t[0]], mesh.points[t[1]], mesh.points[t[2]]).point);
+      p -
+      mesh::nearest_on_triangle(p, mesh.points[t[0]], mesh.points[t[1]], mesh.points[t[2]]).point);
 }
 
 inline std::set<std::pair<std::uint32_t, std::uint32_t>> edges_of(const TriangleMesh& mesh) {
@@ -83,7 +84,7 @@ inline double depth(const TriangleMesh& in, const std::array<Vec3, 2>& box, cons
     return 0;
   double least = HUGE_VAL;
   for (const Triangle& t : in.triangles)
-    least = smaller(least, distance(in, t, p));
+    least = numeric::smaller(least, distance(in, t, p));
   return least;
 }
 
@@ -95,16 +96,16 @@ inline Overlap depth_inside(const TriangleMesh& one, const TriangleMesh& other, 
   for (const Triangle& t : other.triangles)
     for (const std::uint32_t i : t)
       for (int a = 0; a < 3; ++a) {
-        box[0][a] = smaller(box[0][a], other.points[i][a]);
-        box[1][a] = larger(box[1][a], other.points[i][a]);
+        box[0][a] = numeric::smaller(box[0][a], other.points[i][a]);
+        box[1][a] = numeric::larger(box[1][a], other.points[i][a]);
       }
   Overlap most;
   for (const auto& [a, b] : overlap::edges_of(one)) {
     const Vec3 &from = one.points[a], &to = one.points[b];
     for (const Vec3& p : {from, to})
-      most.nodes = larger(most.nodes, overlap::depth(other, box, p) / edge);
+      most.nodes = numeric::larger(most.nodes, overlap::depth(other, box, p) / edge);
     for (const Vec3& p : overlap::along(from, to))
-      most.edges = larger(most.edges, overlap::depth(other, box, p) / edge);
+      most.edges = numeric::larger(most.edges, overlap::depth(other, box, p) / edge);
   }
   return most;
 }
@@ -127,13 +128,13 @@ inline double depth_in_itself(const TriangleMesh& mesh, double edge) {
       if ((of_p > 0) == (of_q > 0))
         continue;
       const Vec3 at = p + of_p / (of_p - of_q) * (q - p);
-      double within = smaller(std::abs(of_p), std::abs(of_q)) / norm(n);
+      double within = numeric::smaller(std::abs(of_p), std::abs(of_q)) / norm(n);
       for (std::size_t k = 0; k < 3; ++k) {
         const Vec3 &from = mesh.points[t[k]], &to = mesh.points[t[(k + 1) % 3]];
         const Vec3 across = cross(q - p, to - from);
         const double inside = dot(cross(n, to - from), at - from);
         const double off = std::abs(dot(across, at - from)) / norm(across);
-        within = smaller(within, inside > 0 ? off : 0);
+        within = numeric::smaller(within, inside > 0 ? off : 0);
       }
       if (!(within > most))
         continue;

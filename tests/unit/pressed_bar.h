@@ -10,13 +10,14 @@ namespace gewebe::test {
 
 class PressedBar {
 public:
-  PressedBar(Model bar, const SolidChoice& choice, bool warp, int threads)
+  PressedBar(model::Model bar, const integrator::SolidChoice& choice, bool warp, int threads)
       : model_(std::move(bar)),
         scene_(context(threads), {.warn = [](const std::string&) {}, .guard = true}) {
-    scene_.add_object("bar", model_, Method::ffe, {}, Integration::semi_implicit, choice);
+    scene_.add_object("bar", model_, scene::Method::ffe, {}, scene::Integration::semi_implicit,
+                      choice);
     if (warp)
-      scene_.apply(SetWarp{0});
-    SetInstrument ball;
+      scene_.apply(scene::SetWarp{0});
+    scene::SetInstrument ball;
     ball.name = "ball";
     ball.shape.radius = 6;
     ball.pose.place = {36, 4, 15};
@@ -25,12 +26,12 @@ public:
   }
   /// Moves the sphere to this height.
   void press(double z) {
-    scene_.apply(MoveInstrument{0, {36, 4, z}, {}, 0});
+    scene_.apply(scene::MoveInstrument{0, {36, 4, z}, {}, 0});
     scene_.step(0.01);
   }
-  const Model& model() const { return model_; }
-  Simulation& scene() { return scene_; }
-  const Simulation& scene() const { return scene_; }
+  const model::Model& model() const { return model_; }
+  scene::Simulation& scene() { return scene_; }
+  const scene::Simulation& scene() const { return scene_; }
 
 private:
   static Context context(int threads) {
@@ -39,8 +40,8 @@ private:
     return context;
   }
 
-  Model model_;
-  Simulation scene_;
+  model::Model model_;
+  scene::Simulation scene_;
 };
 
 } // namespace gewebe::test

@@ -17,8 +17,8 @@ inline double relative_difference(std::span<const double> a, std::span<const dou
     return HUGE_VAL;
   double max = 0, size = 0;
   for (std::size_t k = 0; k < a.size(); ++k) {
-    max = larger(max, std::abs(a[k] - b[k]));
-    size = larger(size, std::abs(b[k]));
+    max = numeric::larger(max, std::abs(a[k] - b[k]));
+    size = numeric::larger(size, std::abs(b[k]));
   }
   return size > 0 ? max / size : max > 0 ? HUGE_VAL : max;
 }
@@ -27,7 +27,7 @@ inline double relative_difference(std::span<const double> a, std::span<const dou
 inline double largest_difference(std::span<const double> a, std::span<const double> b) {
   double most = a.size() == b.size() ? 0 : HUGE_VAL;
   for (std::size_t k = 0; k < std::min(a.size(), b.size()); ++k)
-    most = larger(most, std::abs(a[k] - b[k]));
+    most = numeric::larger(most, std::abs(a[k] - b[k]));
   return most;
 }
 

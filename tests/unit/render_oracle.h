@@ -23,14 +23,14 @@
 namespace gewebe::test {
 
 struct OracleScene {
-  TriangleMesh mesh;                    ///< with texture coordinates
-  std::optional<Image> base, structure; ///< the structure is gray
-  std::optional<Heights> heights;       ///< a structure of 16 bits instead
-  std::optional<Image> detail;          ///< by the mesh's coordinates
-  std::optional<Image> reflection;      ///< sphere-mapped
-  std::optional<SolidTexture> solid_base, solid_detail, solid_structure;
-  RestMapping rest; ///< triplanar: of all but the reflection
-  WetFilm film;
+  TriangleMesh mesh;                             ///< with texture coordinates
+  std::optional<texture::Image> base, structure; ///< the structure is gray
+  std::optional<texture::Heights> heights;       ///< a structure of 16 bits instead
+  std::optional<texture::Image> detail;          ///< by the mesh's coordinates
+  std::optional<texture::Image> reflection;      ///< sphere-mapped
+  std::optional<texture::SolidTexture> solid_base, solid_detail, solid_structure;
+  texture::RestMapping rest; ///< triplanar: of all but the reflection
+  texture::WetFilm film;
   Vec3 background; ///< what it mirrors, of the first scene
   Vec3 color{1, 1, 1}, light;
   double offset = 0, shade = 0;
@@ -50,7 +50,8 @@ struct OraclePixel {
 
 class Oracle {
 public:
-  Oracle(const OracleScene& scene, const Camera& camera, std::uint32_t width, std::uint32_t height)
+  Oracle(const OracleScene& scene, const shading::Camera& camera, std::uint32_t width,
+         std::uint32_t height)
       : scene_(scene), camera_(camera), width_(width), height_(height) {
     find_frames();
     bound();
@@ -117,8 +118,8 @@ private:
         *levels = levels_of(**image, 255, scene_.mipmap);
     if (scene.heights)
       material.structure = levels_of(
-          DeepImage{scene.heights->width, scene.heights->height, 1, scene.heights->values}, 65535,
-          scene_.mipmap);
+          texture::DeepImage{scene.heights->width, scene.heights->height, 1, scene.heights->values},
+          65535, scene_.mipmap);
   }
 
   const Vec3& corner(std::size_t t, std::size_t c) const {
@@ -197,7 +198,7 @@ private:
 
   /// By area, from the level before, whose values have 8 bits, 16 for gray; halves are rounded up.
   template <class Value>
-  static Levels levels_of(const Pixels<Value>& image, double top, bool all) {
+  static Levels levels_of(const texture::Pixels<Value>& image, double top, bool all) {
     Levels levels{{image.width, image.height, image.channels, {}}};
     for (const Value value : image.values)
       levels[0].values.push_back(value / top);
@@ -356,7 +357,7 @@ private:
   }
 
   /// Cook and Torrance's product of distribution, shadowing and reflectance, as wet_film.h has it.
-  double wet(const WetFilm& film, double color, double around, const Vec3& place, Vec3 n,
+  double wet(const texture::WetFilm& film, double color, double around, const Vec3& place, Vec3 n,
              double r) const {
     const Vec3 v = unit(camera_.eye - place), l = to_light(place), h = unit(v + l);
     n = n * std::copysign(1.0, dot(n, v));
@@ -409,7 +410,7 @@ private:
                 (in_plane(x, y + h) - in_plane(x, y - h)) / (2 * h)};
     const double footprint = std::max(norm(p.change[0]), norm(p.change[1]));
     p.footprint = solid ? footprint : 0;
-    const auto colors = [&](const std::optional<SolidTexture>& texture,
+    const auto colors = [&](const std::optional<texture::SolidTexture>& texture,
                             std::array<double, 3>& out) {
       for (int c = 0; texture && c < 3; ++c)
         out[static_cast<std::size_t>(c)] =
@@ -537,7 +538,7 @@ private:
   }
 
   const OracleScene& scene_;
-  const Camera& camera_;
+  const shading::Camera& camera_;
   double width_, height_;
   std::map<Key, Frame> frames_;
   std::vector<Box3> bounds_;
@@ -549,7 +550,7 @@ private:
 
 using OraclePicture = std::vector<OraclePixel>;
 
-inline OraclePicture oracle_picture(const OracleScene& scene, const Camera& camera,
+inline OraclePicture oracle_picture(const OracleScene& scene, const shading::Camera& camera,
                                     std::uint32_t width, std::uint32_t height) {
   const Oracle oracle(scene, camera, width, height);
   OraclePicture picture(std::size_t{width} * height);
@@ -569,7 +570,7 @@ struct OracleComparison {
 };
 
 /// Holds `picture` against the oracle's.
-inline OracleComparison compare(const Image& picture, const OraclePicture& oracle) {
+inline OracleComparison compare(const texture::Image& picture, const OraclePicture& oracle) {
   OracleComparison result;
   double squares = 0, rounded = 0;
   for (std::size_t at = 0; at < oracle.size(); ++at) {
@@ -593,8 +594,8 @@ inline OracleComparison compare(const Image& picture, const OraclePicture& oracl
   return result;
 }
 
-inline OracleComparison compare(const Image& picture, const OracleScene& scene,
-                                const Camera& camera) {
+inline OracleComparison compare(const texture::Image& picture, const OracleScene& scene,
+                                const shading::Camera& camera) {
   return compare(picture, oracle_picture(scene, camera, picture.width, picture.height));
 }
 

@@ -15,8 +15,8 @@
 namespace gewebe::test {
 
 /// A texture of odd sides with soft spots, all channels different.
-inline Image spots(std::uint32_t width, std::uint32_t height, std::uint32_t channels) {
-  Image image{width, height, channels, {}};
+inline texture::Image spots(std::uint32_t width, std::uint32_t height, std::uint32_t channels) {
+  texture::Image image{width, height, channels, {}};
   std::mt19937 random(7);
   for (std::uint32_t y = 0; y < height; ++y)
     for (std::uint32_t x = 0; x < width; ++x)
@@ -61,21 +61,21 @@ inline TriangleMesh torus(std::uint32_t around, std::uint32_t across, bool mirro
 }
 
 /// The material that an oracle's scene has, before black unless it has another background.
-inline SurfaceMaterial material_of(const OracleScene& scene) {
-  SurfaceMaterial material;
-  TextureOptions filter;
-  filter.filter = scene.mipmap ? TextureFilter::mipmap : TextureFilter::linear;
+inline texture::SurfaceMaterial material_of(const OracleScene& scene) {
+  texture::SurfaceMaterial material;
+  texture::TextureOptions filter;
+  filter.filter = scene.mipmap ? texture::TextureFilter::mipmap : texture::TextureFilter::linear;
   if (scene.base)
-    material.base = texture_from(*scene.base, filter);
+    material.base = texture::texture_from(*scene.base, filter);
   if (scene.structure)
-    material.structure = texture_from(*scene.structure, filter);
+    material.structure = texture::texture_from(*scene.structure, filter);
   if (scene.heights)
-    material.structure = texture_from(*scene.heights, filter);
+    material.structure = texture::texture_from(*scene.heights, filter);
   if (scene.detail)
-    material.detail = texture_from(*scene.detail, filter);
+    material.detail = texture::texture_from(*scene.detail, filter);
   filter.sphere = true;
   if (scene.reflection)
-    material.reflection = texture_from(*scene.reflection, filter);
+    material.reflection = texture::texture_from(*scene.reflection, filter);
   material.solid_base = scene.solid_base;
   material.solid_detail = scene.solid_detail;
   material.solid_structure = scene.solid_structure;

@@ -52,7 +52,7 @@ inline double noise_oracle(const Vec3& y, int k, std::uint32_t seed) {
 }
 
 /// f at p for a footprint, both in mm.
-inline double solid_oracle(const SolidTexture& texture, const Vec3& p, double footprint) {
+inline double solid_oracle(const texture::SolidTexture& texture, const Vec3& p, double footprint) {
   // p turned by the quaternion w + v: p + 2 w (v × p) + 2 v × (v × p), for one of length 1.
   const double length = std::sqrt(39.0), w = 5 / length;
   const Vec3 v = Vec3{2, 3, 1} / length;
@@ -62,7 +62,7 @@ inline double solid_oracle(const SolidTexture& texture, const Vec3& p, double fo
     return texture.filtered ? std::clamp(1.5 - 2 * u, 0.0, 1.0) : 1.0;
   };
   const double g = texture.roughness;
-  if (texture.kind == SolidKind::noise) {
+  if (texture.kind == texture::SolidKind::noise) {
     double sum = 0, squares = 0;
     for (int k = 0; k < texture.octaves; ++k) {
       sum += share(k) * std::pow(g, k) * noise_oracle(y, k, texture.seed);

@@ -7,7 +7,7 @@
 #include <string>
 #include <unistd.h>
 
-namespace gewebe {
+namespace gewebe::test {
 
 class ScratchFile {
 public:
@@ -29,4 +29,4 @@ private:
   std::string path_;
 };
 
-} // namespace gewebe
+} // namespace gewebe::test

@@ -24,16 +24,17 @@ namespace gewebe::test {
 
 /// A body that is held, and what it was made of.
 struct Solid {
-  TetMesh mesh;
-  std::vector<SolidMaterial> materials;
-  std::vector<SolidElement> elements;
+  tetrahedra::TetMesh mesh;
+  std::vector<fem::SolidMaterial> materials;
+  std::vector<fem::SolidElement> elements;
   std::vector<std::uint8_t> fixed;
 
-  Solid(TetMesh of_corners, bool quadratic, std::vector<SolidMaterial> of_materials)
+  Solid(tetrahedra::TetMesh of_corners, bool quadratic,
+        std::vector<fem::SolidMaterial> of_materials)
       : mesh(std::move(of_corners)), materials(std::move(of_materials)) {
     if (quadratic)
-      make_quadratic(mesh);
-    elements = solid_elements(mesh, materials);
+      tetrahedra::make_quadratic(mesh);
+    elements = fem::solid_elements(mesh, materials);
     fixed.resize(3 * mesh.points.size());
   }
   std::size_t unknowns() const {
@@ -46,7 +47,7 @@ struct Solid {
         fixed[3 * i + axis] = 1;
   }
   /// Triangles of the boundary whose corners all are there.
-  std::vector<std::uint32_t> triangles(const TetBoundary& faces,
+  std::vector<std::uint32_t> triangles(const tetrahedra::TetBoundary& faces,
                                        const std::function<bool(const Vec3&)>& there) const {
     std::vector<std::uint32_t> found;
     for (std::uint32_t k = 0; k < faces.mesh.triangles.size(); ++k) {
@@ -70,16 +71,17 @@ struct Solid {
 
 /// Displacements under a load, with those on fixed axes as given, or 0: of a matrix and its factor.
 inline std::vector<double> displacements(const Solid& solid, std::vector<double> load,
-                                         std::vector<double> given, const StiffnessMatrix& k,
-                                         const Factor& factor) {
+                                         std::vector<double> given,
+                                         const linalg::StiffnessMatrix& k,
+                                         const linalg::Factor& factor) {
   given.resize(solid.fixed.size());
   for (std::size_t axis = 0; axis < given.size(); ++axis)
     given[axis] = solid.fixed[axis] != 0 ? given[axis] : 0;
   std::vector<double> held(given.size()), moved(given.size());
-  multiply_solid(solid.mesh, solid.elements, given, held);
+  fem::multiply_solid(solid.mesh, solid.elements, given, held);
   for (std::size_t axis = 0; axis < given.size(); ++axis)
     load[axis] -= held[axis];
-  solve_axes(k, factor, load, moved);
+  linalg::solve_axes(k, factor, load, moved);
   for (std::size_t axis = 0; axis < given.size(); ++axis)
     given[axis] += moved[axis];
   return given;
@@ -95,8 +97,9 @@ struct SolidCase {
 };
 
 inline std::vector<double> displacements(const SolidCase& c) {
-  const StiffnessMatrix k = solid_stiffness(c.solid.mesh, c.solid.elements, c.solid.fixed);
-  return displacements(c.solid, c.load, c.given, k, Factor(k, {}));
+  const linalg::StiffnessMatrix k =
+      fem::solid_stiffness(c.solid.mesh, c.solid.elements, c.solid.fixed);
+  return displacements(c.solid, c.load, c.given, k, linalg::Factor(k, {}));
 }
 inline double figure(const SolidCase& c) {
   return c.read(c.solid, displacements(c));
@@ -119,8 +122,8 @@ inline SolidCase patch(bool quadratic, double poisson) {
   c.read = [exact = c.given](const Solid&, const std::vector<double>& u) {
     double error = 0, whole = 0;
     for (std::size_t axis = 0; axis < u.size(); ++axis) {
-      error = larger(error, std::abs(u[axis] - exact[axis]));
-      whole = larger(whole, std::abs(exact[axis]));
+      error = numeric::larger(error, std::abs(u[axis] - exact[axis]));
+      whole = numeric::larger(whole, std::abs(exact[axis]));
     }
     return error / whole;
   };
@@ -165,7 +168,7 @@ inline std::array<double, 10> shapes(const std::array<double, 4>& l, bool quadra
 /// Two standing waves, one of shear and one of volume whose pressure stays of the size of the shear
 /// stress as nu goes to 1/2.
 struct Waves {
-  Elasticity material;
+  fem::Elasticity material;
   Vec3 across{1, 2, -1}, along{1.5, -1, 2}; ///< their wave vectors
   Vec3 shear{1, 0, 1};                      ///< at right angles to the first
 
@@ -185,7 +188,7 @@ struct Waves {
 /// their bubbles hand on, or `plain`.
 inline SolidCase waves(std::uint32_t n, bool quadratic, double poisson, bool plain = false) {
   SolidCase c{{box_tetrahedra(n, n, n, 1.0 / n), quadratic, {{2500, poisson, 1}}}, {}, {}, {}};
-  const Waves exact{elasticity(2500, poisson)};
+  const Waves exact{fem::elasticity(2500, poisson)};
   const auto points = integration_points();
   const std::size_t count = quadratic ? 10 : 4;
   const auto place = [](const Solid& solid, std::size_t t, const std::array<double, 4>& l) {
@@ -196,7 +199,7 @@ inline SolidCase waves(std::uint32_t n, bool quadratic, double poisson, bool pla
   };
   c.load.resize(c.solid.fixed.size());
   for (std::size_t t = 0; t < c.solid.elements.size(); ++t) {
-    const SolidElement& e = c.solid.elements[t];
+    const fem::SolidElement& e = c.solid.elements[t];
     std::array<Vec3, 10> force{}, even{};
     Vec3 at_bubble; // mean of the force density, weighted by the bubble
     for (const IntegrationPoint& point : points) {
@@ -207,7 +210,7 @@ inline SolidCase waves(std::uint32_t n, bool quadratic, double poisson, bool pla
       at_bubble +=
           256 * point.at[0] * point.at[1] * point.at[2] * point.at[3] / (32.0 / 105 * e.volume) * f;
     }
-    body_load(e, at_bubble, std::span(even).first(count));
+    fem::body_load(e, at_bubble, std::span(even).first(count));
     for (std::size_t a = 0; a < count; ++a) {
       if (quadratic && !plain) // what the bubble hands on
         force[a] += even[a] - at_bubble * (e.volume * (a < 4 ? -1.0 / 20 : 1.0 / 5));
@@ -255,9 +258,9 @@ inline SolidCase slender_beam(bool quadratic, double poisson, std::uint32_t acro
               {}};
   for (std::size_t axis = 0; axis < 3; ++axis)
     c.solid.hold(axis, [](const Vec3& p) { return p.x == 0; });
-  const TetBoundary faces = boundary(c.solid.mesh);
+  const tetrahedra::TetBoundary faces = tetrahedra::boundary(c.solid.mesh);
   const auto end = c.solid.triangles(faces, [&](const Vec3& p) { return p.x > length - 1e-6; });
-  c.load = traction_load(c.solid.mesh, faces, end, {0, 0, -traction});
+  c.load = fem::traction_load(c.solid.mesh, faces, end, {0, 0, -traction});
   const double force = traction * height * height, inertia = std::pow(height, 4) / 12,
                coefficient = 10 * (1 + poisson) / (12 + 11 * poisson),
                shear = young / (2 * (1 + poisson));
@@ -272,15 +275,15 @@ inline SolidCase slender_beam(bool quadratic, double poisson, std::uint32_t acro
 /// Cook's membrane in plane strain, E = 250, nu = 0.4999, 100 on the right side. The figure is how
 /// far its upper right corner rises.
 inline SolidCase cooks_membrane(std::uint32_t n, bool quadratic) {
-  TetMesh box = box_tetrahedra(n, n, 1, 1.0 / n);
+  tetrahedra::TetMesh box = box_tetrahedra(n, n, 1, 1.0 / n);
   for (Vec3& p : box.points)
     p = {48 * p.x, 44 * p.x + (44 - 28 * p.x) * p.y, 48 * p.z};
   SolidCase c{{std::move(box), quadratic, {{250, 0.4999, 1}}}, {}, {}, {}};
   for (std::size_t axis = 0; axis < 3; ++axis)
     c.solid.hold(axis, [&](const Vec3& p) { return axis == 2 || p.x == 0; });
-  const TetBoundary faces = boundary(c.solid.mesh);
+  const tetrahedra::TetBoundary faces = tetrahedra::boundary(c.solid.mesh);
   const auto right = c.solid.triangles(faces, [](const Vec3& p) { return p.x > 48 - 1e-6; });
-  c.load = traction_load(c.solid.mesh, faces, right, {0, 6.25, 0});
+  c.load = fem::traction_load(c.solid.mesh, faces, right, {0, 6.25, 0});
   c.read = [](const Solid& solid, const std::vector<double>& u) {
     return u[3 * solid.node_at({48, 60, 0}) + 1];
   };
@@ -295,7 +298,7 @@ inline constexpr double cooks_rise = 7.7712;
 /// figure is stress yy at the inner end of its upper side, D, MPa.
 inline SolidCase le10(std::uint32_t radial, std::uint32_t around, std::uint32_t through,
                       bool quadratic) {
-  TetMesh box = box_tetrahedra(radial, around, through);
+  tetrahedra::TetMesh box = box_tetrahedra(radial, around, through);
   for (Vec3& p : box.points) {
     const double out = p.x / radial, angle = p.y / around * std::numbers::pi / 2;
     const bool first = p.y == 0, last = p.y == around;
@@ -310,14 +313,14 @@ inline SolidCase le10(std::uint32_t radial, std::uint32_t around, std::uint32_t 
   c.solid.hold(0, [&](const Vec3& p) { return p.x == 0 || outside(p); });
   c.solid.hold(1, [&](const Vec3& p) { return p.y == 0 || outside(p); });
   c.solid.hold(2, [&](const Vec3& p) { return outside(p) && std::abs(p.z - 0.3) < 1e-9; });
-  const TetBoundary faces = boundary(c.solid.mesh);
+  const tetrahedra::TetBoundary faces = tetrahedra::boundary(c.solid.mesh);
   const auto top = c.solid.triangles(faces, [](const Vec3& p) { return p.z > 0.6 - 1e-9; });
-  c.load = pressure_load(c.solid.mesh, faces, top, 1e6);
+  c.load = fem::pressure_load(c.solid.mesh, faces, top, 1e6);
   c.read = [](const Solid& solid, const std::vector<double>& u) {
-    const auto stresses =
-        nodal_tensors(solid.mesh, solid.elements,
-                      solid_stresses(solid.elements, solid_strains(solid.mesh, solid.materials,
-                                                                   solid.elements, u)));
+    const auto stresses = fem::nodal_tensors(
+        solid.mesh, solid.elements,
+        fem::solid_stresses(solid.elements,
+                            fem::solid_strains(solid.mesh, solid.materials, solid.elements, u)));
     return stresses[solid.node_at({2, 0, 0.6})][3] / 1e6;
   };
   return c;
@@ -340,7 +343,7 @@ inline SolidCase silicone_beam(std::uint32_t across, bool quadratic) {
               {}};
   for (std::size_t axis = 0; axis < 3; ++axis)
     c.solid.hold(axis, [](const Vec3& p) { return p.x == 0; });
-  c.load = gravity_load(c.solid.mesh, c.solid.materials, c.solid.elements, {0, 0, -9807.09});
+  c.load = fem::gravity_load(c.solid.mesh, c.solid.materials, c.solid.elements, {0, 0, -9807.09});
   c.read = [](const Solid& solid, const std::vector<double>& u) {
     return -u[3 * solid.node_at({100, 0, 25}) + 2];
   };

@@ -16,19 +16,19 @@
 
 namespace gewebe::test {
 
-inline Model model_of(const TriangleMesh& mesh, std::int64_t centrals = 4,
-                      const BuildOptions& more = {}) {
-  BuildOptions options = more;
+inline model::Model model_of(const TriangleMesh& mesh, std::int64_t centrals = 4,
+                             const model::BuildOptions& more = {}) {
+  model::BuildOptions options = more;
   options.centrals = centrals;
-  Model model = build_model(mesh, options, Context{}).model;
+  model::Model model = model::build_model(mesh, options, Context{}).model;
   model.name = "ball";
   return model;
 }
 
 /// A point cloud's worth of random springs: every kind of direction, and rest lengths that differ
 /// from the lengths where `stretch` isn't 1.
-inline Model stretched(Model model, double stretch) {
-  for (Spring& s : model.springs)
+inline model::Model stretched(model::Model model, double stretch) {
+  for (model::Spring& s : model.springs)
     s.rest = norm(model.nodes[s.j].position - model.nodes[s.i].position) / stretch;
   return model;
 }
@@ -48,16 +48,16 @@ inline std::string shared_file(const std::string& name) {
   return std::filesystem::exists(path) ? path : "";
 }
 
-inline Model model_of_file(const std::string& path, const std::string& unit) {
-  Input input(path);
-  const Kind kind = input_kind(input.peek(4096), path, "");
-  return model_of(read_mesh(input, {kind, unit, weld_from_name("auto")}));
+inline model::Model model_of_file(const std::string& path, const std::string& unit) {
+  formats::Input input(path);
+  const formats::Kind kind = formats::input_kind(input.peek(4096), path, "");
+  return model_of(formats::read_mesh(input, {kind, unit, formats::weld_from_name("auto")}));
 }
 
 /// A block of material: nodes on a lattice, coupled as the corners of tetrahedra are. Its fronts
 /// are as large as those of solids.
-inline Model block_of_material(std::size_t side) {
-  Model model;
+inline model::Model block_of_material(std::size_t side) {
+  model::Model model;
   const auto number = [&](std::size_t x, std::size_t y, std::size_t z) {
     return static_cast<std::uint32_t>((x * side + y) * side + z);
   };
@@ -65,7 +65,7 @@ inline Model block_of_material(std::size_t side) {
   for (std::size_t k = 0; k < side * side * side; ++k) {
     const auto off = [&] { return 1e-10 * static_cast<double>(random()); };
     const std::size_t x = k / (side * side), y = k / side % side, z = k % side;
-    Node node;
+    model::Node node;
     node.position = {static_cast<double>(x) + off(), static_cast<double>(y) + off(),
                      static_cast<double>(z) + off()};
     node.fixed = z == 0 ? 7 : static_cast<std::uint8_t>(k % 97 == 1 ? 2 : 0);
@@ -78,7 +78,7 @@ inline Model block_of_material(std::size_t side) {
           const std::size_t a = x + way % 2, b = y + way / 2 % 2, c = z + way / 4;
           if (std::max({a, b, c}) == side)
             continue;
-          Spring spring;
+          model::Spring spring;
           spring.i = std::min(number(x, y, z), number(a, b, c));
           spring.j = std::max(number(x, y, z), number(a, b, c));
           spring.stiffness = 1 + 1e-10 * static_cast<double>(random());

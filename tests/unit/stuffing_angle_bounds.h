@@ -125,7 +125,7 @@ inline double cosine(double degrees) {
 /// Do all dihedral angles of the tetrahedron with nodes on these ranges lie within the bounds?
 inline bool angles_are_within(const std::array<Range, 4>& nodes, double lowest, double highest) {
   const double low2 = cosine(lowest) * cosine(lowest), high2 = cosine(highest) * cosine(highest);
-  for (const auto& [i, j] : tetrahedron_edges) {
+  for (const auto& [i, j] : tetrahedra::tetrahedron_edges) {
     std::array<std::size_t, 2> rest{};
     std::size_t count = 0;
     for (std::size_t n = 0; n < 4; ++n)

@@ -18,16 +18,16 @@ namespace gewebe::scenes {
 
 /// A grid with the values of `function(i, j, k)` on the box min … max (inclusive), else background.
 template <class Function>
-Grid sample(const GridInfo& info, const Int3& min, const Int3& max, const Function& function,
-            bool prune = true) {
+volume::Grid sample(const volume::GridInfo& info, const Int3& min, const Int3& max,
+                    const Function& function, bool prune = true) {
   std::vector<Int3> origins;
   for (int i = min[0] & ~7; i <= max[0]; i += 8)
     for (int j = min[1] & ~7; j <= max[1]; j += 8)
       for (int k = min[2] & ~7; k <= max[2]; k += 8)
         origins.push_back({i, j, k});
-  GridBuilder builder(info);
-  for (const LeafRef& leaf : builder.add_leaves({}, origins))
-    for (int n = 0; n < leaf_voxels; ++n) {
+  volume::GridBuilder builder(info);
+  for (const volume::LeafRef& leaf : builder.add_leaves({}, origins))
+    for (int n = 0; n < volume::leaf_voxels; ++n) {
       const Int3 p{leaf.origin[0] + (n >> 6), leaf.origin[1] + (n >> 3 & 7),
                    leaf.origin[2] + (n & 7)};
       bool in = true;
@@ -72,10 +72,10 @@ inline std::vector<Ball> five_balls(double n, std::uint32_t seed) {
   }
   return balls;
 }
-inline Grid metaballs(int n, std::uint32_t seed, double voxel = 1) {
+inline volume::Grid metaballs(int n, std::uint32_t seed, double voxel = 1) {
   const std::vector<Ball> balls = five_balls(n, seed);
-  GridInfo info;
-  info.transform = uniform_transform(voxel);
+  volume::GridInfo info;
+  info.transform = volume::uniform_transform(voxel);
   return sample(info, {0, 0, 0}, {n, n, n}, [&](int i, int j, int k) {
     return density(balls, {static_cast<double>(i), static_cast<double>(j), static_cast<double>(k)});
   });
@@ -83,7 +83,7 @@ inline Grid metaballs(int n, std::uint32_t seed, double voxel = 1) {
 
 /// n³ random values around the isovalue 0.5 at a random offset; with levels > 0 quantised to
 /// multiples of 1/levels, so that many values meet the isovalue exactly.
-inline Grid noise(int n, std::uint32_t seed, int levels = 0) {
+inline volume::Grid noise(int n, std::uint32_t seed, int levels = 0) {
   std::mt19937 random(seed);
   const auto offset = [&] { return static_cast<int>(random() % 16) - 8; };
   const Int3 min{offset(), offset(), offset()};
@@ -95,13 +95,13 @@ inline Grid noise(int n, std::uint32_t seed, int levels = 0) {
 
 /// Snapping as the report tells it, without fin rule and link condition: every crossing near a
 /// corner goes there, faces with equal corners vanish. Breaks meshes; a negative control.
-inline TriangleMesh snap_naively(const IsoSurface& surface, double epsilon) {
+inline TriangleMesh snap_naively(const surface::IsoSurface& surface, double epsilon) {
   std::map<Int3, std::uint32_t> corners;
-  const std::vector<EdgeCrossing> crossings = edge_crossings(surface);
+  const std::vector<surface::EdgeCrossing> crossings = surface::edge_crossings(surface);
   std::vector<std::uint32_t> number(crossings.size());
   TriangleMesh mesh;
   for (std::size_t p = 0; p < number.size(); ++p) {
-    const EdgeCrossing& c = crossings[p];
+    const surface::EdgeCrossing& c = crossings[p];
     Int3 corner = c.corner;
     if (1 - c.fraction <= epsilon)
       ++corner[static_cast<std::size_t>(c.axis)];
@@ -120,12 +120,12 @@ inline TriangleMesh snap_naively(const IsoSurface& surface, double epsilon) {
 }
 
 /// Closed, 2-manifold, oriented, no point unused.
-inline bool is_sound(const MeshReport& report) {
+inline bool is_sound(const mesh::MeshReport& report) {
   return report.closed() && report.manifold() && report.oriented() && report.unused_points == 0;
 }
 
 /// A sound mesh of the same topology as before the snap.
-inline bool keeps_topology(const MeshReport& before, const MeshReport& after) {
+inline bool keeps_topology(const mesh::MeshReport& before, const mesh::MeshReport& after) {
   return is_sound(before) && is_sound(after) && before.euler == after.euler &&
          before.components == after.components;
 }

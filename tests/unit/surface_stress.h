@@ -15,7 +15,7 @@ inline constexpr std::array<double, 7> stress_epsilons{0, 0.05, 0.15, 0.25, 0.35
 
 struct StressScene {
   std::string name;
-  Grid grid;
+  volume::Grid grid;
 };
 
 /// Scene n of an endless list. Closed: what is inside keeps away from the border of the values;
@@ -86,7 +86,7 @@ inline StressScene stress_scene(std::uint32_t n) {
 
 /// What both judges have against a mesh that was snapped from `before`; "" if nothing.
 inline std::string stress_complaint(const TriangleMesh& before, const TriangleMesh& after) {
-  const MeshReport ours = examine_mesh(before), snapped = examine_mesh(after);
+  const mesh::MeshReport ours = mesh::examine_mesh(before), snapped = mesh::examine_mesh(after);
   if (!is_sound(ours))
     return "broken before snapping";
   if (!is_sound(snapped))
@@ -103,10 +103,10 @@ inline std::string stress_complaint(const TriangleMesh& before, const TriangleMe
 
 /// The first complaint about a scene at all epsilons; "" if there is none.
 inline std::string stress_complaint(const StressScene& scene) {
-  const IsoSurface surface = marching_cubes({}, scene.grid);
+  const surface::IsoSurface surface = surface::marching_cubes({}, scene.grid);
   for (const double epsilon : stress_epsilons) {
     const std::string complaint =
-        stress_complaint(surface.mesh, snap({}, surface, {.epsilon = epsilon}).mesh);
+        stress_complaint(surface.mesh, surface::snap({}, surface, {.epsilon = epsilon}).mesh);
     if (!complaint.empty())
       return scene.name + ", epsilon " + std::to_string(epsilon) + ": " + complaint;
   }

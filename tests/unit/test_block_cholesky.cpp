@@ -17,7 +17,7 @@
 #include <span>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::test {
 namespace {
 
 using Eigen::Index, Eigen::MatrixXd, Eigen::VectorXd;
@@ -51,7 +51,8 @@ Blocks blocks(const std::vector<std::size_t>& sizes, const std::vector<std::uint
   return all;
 }
 
-VectorXd solved(const Blocks& of, const VectorXd& f, CpuLevel cpu, BlockCholesky& factor) {
+VectorXd solved(const Blocks& of, const VectorXd& f, CpuLevel cpu,
+                cholesky::BlockCholesky& factor) {
   MatrixXd copy = of.matrix;
   EXPECT_TRUE(factor.factor({copy.data(), static_cast<std::size_t>(copy.size())}, of.group,
                             of.coupled, cpu));
@@ -62,7 +63,7 @@ VectorXd solved(const Blocks& of, const VectorXd& f, CpuLevel cpu, BlockCholesky
 
 TEST(BlockCholesky, SolvesAnyGraphOfGroupsAsADenseFactorDoes) {
   std::mt19937 random(5);
-  BlockCholesky factor; // one for all: it keeps memory
+  cholesky::BlockCholesky factor; // one for all: it keeps memory
   for (unsigned n = 0; n < 60; ++n) {
     const std::size_t groups = 1 + random() % 7;
     std::vector<std::size_t> sizes;
@@ -90,7 +91,7 @@ TEST(BlockCholesky, RefusesWhatIsNotPositiveDefinite) {
   for (Index at = 0; at < all.matrix.rows(); ++at) {
     MatrixXd wrong = all.matrix;
     wrong(at, at) = -wrong(at, at);
-    BlockCholesky factor;
+    cholesky::BlockCholesky factor;
     EXPECT_FALSE(factor.factor({wrong.data(), static_cast<std::size_t>(wrong.size())}, all.group,
                                all.coupled, best_cpu_level()));
     wrong(at, at) = NAN;
@@ -100,4 +101,4 @@ TEST(BlockCholesky, RefusesWhatIsNotPositiveDefinite) {
 }
 
 } // namespace
-} // namespace gewebe
+} // namespace gewebe::test

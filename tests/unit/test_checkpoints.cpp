@@ -14,17 +14,17 @@
 #include <sys/resource.h>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::test {
 namespace {
 
 std::uint64_t rows_after_restoring(const std::string& path, bool& refused) {
   refused = false;
   try {
-    hdf5::File file = hdf5::File::reopen_checkpoint(path);
-    const std::uint64_t rows = file.root().dataset("rows", hdf5::Number::float64).rows();
+    formats::hdf5::File file = formats::hdf5::File::reopen_checkpoint(path);
+    const std::uint64_t rows = file.root().dataset("rows", formats::hdf5::Number::float64).rows();
     file.root().set("partial", "why");
     file.close();
-    EXPECT_TRUE(hdf5::File::open_own(path).root().has_attribute("partial"));
+    EXPECT_TRUE(formats::hdf5::File::open_own(path).root().has_attribute("partial"));
     return rows;
   } catch (const Error&) {
     refused = true;
@@ -42,13 +42,14 @@ TEST(Checkpoints, WhatIsNotInACheckpointIsNotInTheFile) {
     const std::uint64_t rows = rows_after_restoring(copy.path(), refused);
     return refused ? -1 : static_cast<int>(rows);
   };
-  hdf5::File made = hdf5::File::create_with_checkpoints(file.path());
-  hdf5::Dataset rows = made.root().create_growing("rows", hdf5::Number::float64, {}, 8);
+  formats::hdf5::File made = formats::hdf5::File::create_with_checkpoints(file.path());
+  formats::hdf5::Dataset rows =
+      made.root().create_growing("rows", formats::hdf5::Number::float64, {}, 8);
   EXPECT_EQ(copied(), -1); // as of a run that was killed now
   const std::vector<double> some(100, 1.5);
   for (int k = 1; k <= 20; ++k) {
     rows.append(std::span<const double>(some));
-    hdf5::Group group = made.root().create_group("group" + std::to_string(k));
+    formats::hdf5::Group group = made.root().create_group("group" + std::to_string(k));
     EXPECT_EQ(copied(), k == 1 ? -1 : 100 * (k - 1)) << k;
     made.checkpoint();
     EXPECT_EQ(copied(), 100 * k) << k;
@@ -82,8 +83,9 @@ private:
 TEST(Checkpoints, AFrameThatFindsNoRoomIsTold) {
   for (const std::size_t size : {100U, 20000U, 60000U}) {
     const ScratchFile file(".h5");
-    hdf5::File made = hdf5::File::create_with_checkpoints(file.path());
-    hdf5::Dataset rows = made.root().create_growing("rows", hdf5::Number::float64, {}, 1024);
+    formats::hdf5::File made = formats::hdf5::File::create_with_checkpoints(file.path());
+    formats::hdf5::Dataset rows =
+        made.root().create_growing("rows", formats::hdf5::Number::float64, {}, 1024);
     const std::vector<double> some(size, 1.5);
     std::uint64_t frames = 0;
     bool told = false;
@@ -108,11 +110,11 @@ TEST(Checkpoints, AFrameThatFindsNoRoomIsTold) {
 }
 
 TEST(Checkpoints, PartialNamesKeepTheSuffix) {
-  EXPECT_EQ(partial_name("run.h5"), "run.partial.h5");
-  EXPECT_EQ(partial_name("a.b/run"), "a.b/run.partial");
-  EXPECT_EQ(partial_name("a/warp.nii.gz"), "a/warp.partial.nii.gz");
-  EXPECT_EQ(partial_name(".gz"), ".gz.partial");
+  EXPECT_EQ(formats::partial_name("run.h5"), "run.partial.h5");
+  EXPECT_EQ(formats::partial_name("a.b/run"), "a.b/run.partial");
+  EXPECT_EQ(formats::partial_name("a/warp.nii.gz"), "a/warp.partial.nii.gz");
+  EXPECT_EQ(formats::partial_name(".gz"), ".gz.partial");
 }
 
 } // namespace
-} // namespace gewebe
+} // namespace gewebe::test

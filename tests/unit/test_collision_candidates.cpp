@@ -185,7 +185,7 @@ TEST(Candidates, HoldAllPairsThatComeCloseOnTheWay) {
     EXPECT_EQ(triangles.size(), candidates.point_triangle.size());
     const auto comes_close = [&](const std::array<std::uint32_t, 4>& v, auto&& squared) {
       for (int step = 0; step <= 10; ++step) {
-        std::array<Vec3, 4> x;
+        std::array<gewebe::Vec3, 4> x;
         for (std::size_t k = 0; k < 4; ++k)
           x[k] = surface.rest[v[k]] + step / 10.0 * (x1[v[k]] - surface.rest[v[k]]);
         if (std::sqrt(squared(x)) < reach + radius_sum(surface, v[0], v[3]))

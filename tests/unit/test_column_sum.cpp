@@ -7,7 +7,7 @@
 #include <random>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::test {
 namespace {
 
 template <class Entry>
@@ -24,7 +24,7 @@ std::vector<double> sum_at(CpuLevel level, std::size_t count, std::size_t begin,
     pointers.push_back(column.data());
     factor.push_back(normal(random));
   }
-  column_sum<Entry>(level)(pointers.data(), factor.data(), count, sum.data(), begin, end);
+  columns::column_sum<Entry>(level)(pointers.data(), factor.data(), count, sum.data(), begin, end);
   return sum;
 }
 
@@ -54,10 +54,10 @@ TEST(ColumnSum, IsThePlainSum) {
   const std::vector<const double*> columns{a.data(), b.data()};
   const std::vector<double> factor{2, 10};
   std::vector<double> sum(9, 1);
-  column_sum<double>(best_cpu_level())(columns.data(), factor.data(), 2, sum.data(), 0, 9);
+  columns::column_sum<double>(best_cpu_level())(columns.data(), factor.data(), 2, sum.data(), 0, 9);
   for (std::size_t r = 0; r < 9; ++r)
     EXPECT_EQ(sum[r], 1 + 2 * a[r] + 10 * b[r]);
 }
 
 } // namespace
-} // namespace gewebe
+} // namespace gewebe::test

@@ -20,7 +20,7 @@ using namespace gewebe::test;
 
 namespace {
 
-class Kept final : public ColumnSink {
+class Kept final : public columns::ColumnSink {
 public:
   void write(std::size_t k, std::span<const double> columns, double) override {
     EXPECT_EQ(k, nodes.size());
@@ -35,7 +35,7 @@ public:
 };
 
 struct Net {
-  Model model;
+  model::Model model;
 
   std::uint32_t add(const Vec3& position, std::uint8_t fixed) {
     model.nodes.push_back({.position = position, .mass = 1, .fixed = fixed});
@@ -50,12 +50,12 @@ struct Net {
   }
 };
 
-Kept columns_of(const Model& model, const std::vector<std::uint32_t>& nodes) {
-  const StiffnessMatrix k = stiffness_matrix(model);
-  StiffnessCheck check;
-  const Factor factor = checked_factor(model, k, {}, check);
+Kept columns_of(const model::Model& model, const std::vector<std::uint32_t>& nodes) {
+  const linalg::StiffnessMatrix k = fem::stiffness_matrix(model);
+  linalg::StiffnessCheck check;
+  const linalg::Factor factor = linalg::checked_factor(model, k, {}, check);
   Kept kept;
-  (void)compliance_columns(k, factor, check.norm, nodes, {}, kept);
+  (void)columns::compliance_columns(k, factor, check.norm, nodes, {}, kept);
   return kept;
 }
 
@@ -63,8 +63,8 @@ Kept columns_of(const Model& model, const std::vector<std::uint32_t>& nodes) {
 
 TEST(ComplianceAnalytic, ATwoNodeChain) {
   Net net;
-  net.add({}, fixed_all);
-  net.add({2, 0, 0}, fixed_y | fixed_z);
+  net.add({}, model::fixed_all);
+  net.add({2, 0, 0}, model::fixed_y | model::fixed_z);
   net.join(0, 1, 8);
   const Kept c = columns_of(net.model, {0, 1});
   EXPECT_DOUBLE_EQ(c.at(1, 0, 1, 0), 1.0 / 8);
@@ -77,9 +77,9 @@ TEST(ComplianceAnalytic, ALongChain) {
   Net net;
   const std::uint32_t n = 40;
   std::vector<double> sum{0};
-  std::vector<std::uint32_t> nodes{net.add({}, fixed_all)};
+  std::vector<std::uint32_t> nodes{net.add({}, model::fixed_all)};
   for (std::uint32_t i = 1; i <= n; ++i) {
-    nodes.push_back(net.add({static_cast<double>(i), 0, 0}, fixed_y | fixed_z));
+    nodes.push_back(net.add({static_cast<double>(i), 0, 0}, model::fixed_y | model::fixed_z));
     const double stiffness = 1 + i % 7;
     net.join(i - 1, i, stiffness);
     sum.push_back(sum.back() + 1 / stiffness);
@@ -99,7 +99,7 @@ TEST(ComplianceAnalytic, ACantilever) {
     for (std::uint32_t i = 0; i <= bays; ++i)
       for (const double y : {0.0, 1.0})
         net.add({static_cast<double>(i), y, 0},
-                static_cast<std::uint8_t>(i == 0 ? fixed_all : fixed_z));
+                static_cast<std::uint8_t>(i == 0 ? model::fixed_all : model::fixed_z));
     const double top = 3, bottom = 5, diagonal = 7, post = 11, m = bays;
     double sinks = (m - 1) / post; // the last post bears nothing
     for (std::uint32_t i = 1; i <= bays; ++i) {
@@ -126,7 +126,7 @@ TEST(ComplianceAnalytic, AHangingNet) {
   for (std::uint32_t y = 0; y <= n; ++y)
     for (std::uint32_t x = 0; x <= n; ++x)
       net.add({static_cast<double>(x), static_cast<double>(y), 0},
-              x % n == 0 || y % n == 0 ? fixed_all : fixed_none);
+              x % n == 0 || y % n == 0 ? model::fixed_all : model::fixed_none);
   const auto node = [&](std::uint32_t x, std::uint32_t y) { return y * (n + 1) + x; };
   for (std::uint32_t y = 0; y <= n; ++y)
     for (std::uint32_t x = 0; x <= n; ++x) {
@@ -167,16 +167,17 @@ double largest_column_difference(const Kept& a, const Kept& b) {
 }
 
 struct Relaxed {
-  Model model = model_of(sphere_mesh(1, 10, {}));
-  StiffnessMatrix k = stiffness_matrix(model);
-  StiffnessCheck check;
-  Factor factor = checked_factor(model, k, {}, check);
+  model::Model model = model_of(sphere_mesh(1, 10, {}));
+  linalg::StiffnessMatrix k = fem::stiffness_matrix(model);
+  linalg::StiffnessCheck check;
+  linalg::Factor factor = linalg::checked_factor(model, k, {}, check);
   std::vector<std::uint32_t> nodes{0, 7, 20};
 
-  RelaxFigures run(const RelaxOptions& options, Kept& kept, int threads = 1) const {
+  dynamics::RelaxFigures run(const dynamics::RelaxOptions& options, Kept& kept,
+                             int threads = 1) const {
     Context context;
     context.threads = threads;
-    return relaxed_columns(model, k, factor, check.norm, nodes, options, context, kept);
+    return dynamics::relaxed_columns(model, k, factor, check.norm, nodes, options, context, kept);
   }
 };
 
@@ -186,7 +187,7 @@ TEST(Relaxation, ComesToTheDirectColumns) {
   const Relaxed r;
   const Kept direct = columns_of(r.model, r.nodes);
   Kept relaxed, again;
-  const RelaxFigures figures = r.run({}, relaxed);
+  const dynamics::RelaxFigures figures = r.run({}, relaxed);
   EXPECT_EQ(figures.pulls, 18U);
   EXPECT_LT(largest_column_difference(relaxed, direct), 1e-6);
   EXPECT_GT(largest_column_difference(relaxed, direct), 1e-15); // it is another way
@@ -208,7 +209,7 @@ TEST(Relaxation, TooFewStepsAreWrongAndManyAreNot) {
     }
   }
   Kept kept;
-  const RelaxFigures figures = r.run({.steps = 5000}, kept);
+  const dynamics::RelaxFigures figures = r.run({.steps = 5000}, kept);
   EXPECT_EQ(figures.steps, 18U * 5000);
   EXPECT_LT(largest_column_difference(kept, direct), 1e-6);
 }

@@ -5,7 +5,7 @@
 
 #include <gtest/gtest.h>
 
-namespace gewebe {
+namespace gewebe::test {
 namespace {
 
 using test::append;
@@ -31,7 +31,7 @@ TriangleMesh cubes() {
 
 TEST(Components, LargestOfEqualIsTheFirst) {
   TriangleMesh mesh = cubes();
-  const ComponentReport report = keep_components(mesh, {.largest = 1});
+  const mesh::ComponentReport report = mesh::keep_components(mesh, {.largest = 1});
   EXPECT_EQ(report.kept, 1U);
   EXPECT_EQ(report.dropped, 4U);
   EXPECT_EQ(report.dropped_points, 33U);
@@ -39,7 +39,7 @@ TEST(Components, LargestOfEqualIsTheFirst) {
   EXPECT_NEAR(report.dropped_volume, 1 + 8 + 27 + 3.375, 1e-12);
   EXPECT_NEAR(report.largest_dropped, 27, 1e-12);
   check_mesh(mesh);
-  const MeshReport left = examine_mesh(mesh);
+  const mesh::MeshReport left = mesh::examine_mesh(mesh);
   EXPECT_EQ(left.components, 1U);
   EXPECT_NEAR(left.volume, 27, 1e-12);
   EXPECT_EQ(mesh.points.front(), (Vec3{5, 0, 0}));
@@ -49,27 +49,27 @@ TEST(Components, LargestOfEqualIsTheFirst) {
 
 TEST(Components, ByNumberAndByVolume) {
   TriangleMesh three = cubes();
-  EXPECT_EQ(keep_components(three, {.largest = 3}).kept, 3U);
+  EXPECT_EQ(mesh::keep_components(three, {.largest = 3}).kept, 3U);
   EXPECT_NEAR(signed_volume(three), 27 + 8 + 27, 1e-9);
   TriangleMesh large = cubes();
-  EXPECT_EQ(keep_components(large, {.min_volume = 3}).dropped,
+  EXPECT_EQ(mesh::keep_components(large, {.min_volume = 3}).dropped,
             1U); // the cavity counts by magnitude
   EXPECT_NEAR(signed_volume(large), 27 + 8 + 27 - 3.375, 1e-9);
   TriangleMesh none = cubes();
-  EXPECT_EQ(keep_components(none, {.min_volume = 100}).kept, 0U);
+  EXPECT_EQ(mesh::keep_components(none, {.min_volume = 100}).kept, 0U);
   EXPECT_TRUE(none.points.empty() && none.triangles.empty() && none.normals.empty());
 }
 
 TEST(Components, KeepsAllByDefault) {
   TriangleMesh mesh = cubes();
   const auto faces = mesh.triangles;
-  const ComponentReport report = keep_components(mesh, {});
+  const mesh::ComponentReport report = mesh::keep_components(mesh, {});
   EXPECT_EQ(report.kept, 5U);
   EXPECT_EQ(report.dropped_points, 1U); // that no face uses
   EXPECT_EQ(mesh.triangles, faces);
   TriangleMesh empty;
-  EXPECT_EQ(keep_components(empty, {.largest = 1}).kept, 0U);
+  EXPECT_EQ(mesh::keep_components(empty, {.largest = 1}).kept, 0U);
 }
 
 } // namespace
-} // namespace gewebe
+} // namespace gewebe::test

@@ -34,35 +34,35 @@
 #include <utility>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::test {
 namespace {
 
 /// A body whose compliance is known.
 struct Body {
   std::vector<Vec3> positions;
   std::vector<std::uint32_t> nodes; ///< that shall have columns
-  StiffnessMatrix matrix;
-  std::unique_ptr<Factor> factor;
+  linalg::StiffnessMatrix matrix;
+  std::unique_ptr<linalg::Factor> factor;
   double norm = 0;
 
-  void finish(StiffnessMatrix k) {
+  void finish(linalg::StiffnessMatrix k) {
     matrix = std::move(k);
-    factor = std::make_unique<Factor>(matrix, Context{});
-    norm = stiffness_norm(matrix);
+    factor = std::make_unique<linalg::Factor>(matrix, Context{});
+    norm = linalg::stiffness_norm(matrix);
   }
-  ColumnMaker maker(const Context& context = {}, std::size_t rows = SIZE_MAX) const {
-    return [this, context, rows](std::span<const std::uint32_t> of, ColumnSink& sink) {
-      return compliance_columns(matrix, *factor, norm, of, context, sink, rows);
+  columns::ColumnMaker maker(const Context& context = {}, std::size_t rows = SIZE_MAX) const {
+    return [this, context, rows](std::span<const std::uint32_t> of, columns::ColumnSink& sink) {
+      return columns::compliance_columns(matrix, *factor, norm, of, context, sink, rows);
     };
   }
-  CompressedMade compress(double relative, int threads = 0) const {
+  columns::CompressedMade compress(double relative, int threads = 0) const {
     Context context;
     context.threads = threads;
-    return compress_columns(positions, nodes, relative, maker(context), context);
+    return columns::compress_columns(positions, nodes, relative, maker(context), context);
   }
 };
 
-class Collected final : public ColumnSink {
+class Collected final : public columns::ColumnSink {
 public:
   std::vector<std::vector<double>> columns;
   void write(std::size_t /*k*/, std::span<const double> of, double /*residual*/) override {
@@ -71,7 +71,7 @@ public:
 };
 
 /// Held where x is least.
-Body solid(const TetMesh& mesh, bool surface_only) {
+Body solid(const tetrahedra::TetMesh& mesh, bool surface_only) {
   Body body;
   body.positions = mesh.points;
   Box3 box;
@@ -81,27 +81,28 @@ Body solid(const TetMesh& mesh, bool surface_only) {
   for (std::size_t i = 0; i < mesh.points.size(); ++i)
     for (std::size_t a = 0; a < 3 && mesh.points[i].x < box.min.x + 0.1 * box.size().x; ++a)
       fixed[3 * i + a] = 1;
-  const std::size_t count = surface_only ? boundary(mesh).mesh.points.size() : mesh.points.size();
+  const std::size_t count =
+      surface_only ? tetrahedra::boundary(mesh).mesh.points.size() : mesh.points.size();
   body.nodes.resize(count);
   std::iota(body.nodes.begin(), body.nodes.end(), 0U);
-  const std::vector<SolidMaterial> material{{5000, 0.45, 1e-3}};
-  body.finish(solid_stiffness(mesh, solid_elements(mesh, material), fixed));
+  const std::vector<fem::SolidMaterial> material{{5000, 0.45, 1e-3}};
+  body.finish(fem::solid_stiffness(mesh, fem::solid_elements(mesh, material), fixed));
   return body;
 }
 
 /// A ball of tetrahedra, whose surface nodes come first.
 Body stuffed_ball(double cell) {
-  return solid(stuff({}, ball_grid(5, cell, {}), {}), true);
+  return solid(stuffing::stuff({}, ball_grid(5, cell, {}), {}), true);
 }
 
 Body net() {
-  const Model model = test::organ_ball(3);
+  const model::Model model = test::organ_ball(3);
   Body body;
-  for (const Node& node : model.nodes)
+  for (const model::Node& node : model.nodes)
     body.positions.push_back(node.position);
   for (std::uint32_t i = 0; i < model.nodes.size(); i += i % 3 == 0 ? 1 : 2)
     body.nodes.push_back(i);
-  body.finish(stiffness_matrix(model));
+  body.finish(fem::stiffness_matrix(model));
   return body;
 }
 
@@ -118,7 +119,8 @@ double largest(const std::vector<std::vector<double>>& columns) {
 }
 
 /// How far columns are from those that they stand for, over the largest entry.
-double error_of(const ColumnSource& columns, const std::vector<std::vector<double>>& exact) {
+double error_of(const columns::ColumnSource& columns,
+                const std::vector<std::vector<double>>& exact) {
   double worst = 0;
   std::vector<double> read(9 * columns.row_nodes());
   for (std::size_t k = 0; k < exact.size(); ++k) {
@@ -130,7 +132,7 @@ double error_of(const ColumnSource& columns, const std::vector<std::vector<doubl
 }
 
 /// Of all chunks.
-std::size_t bytes(const CompressedMade& made) {
+std::size_t bytes(const columns::CompressedMade& made) {
   std::size_t sum = 0;
   for (const auto& chunk : made.chunks)
     sum += chunk.size();
@@ -141,11 +143,11 @@ void expect_within(const char* name, const Body& body, std::initializer_list<dou
   Collected exact;
   body.maker()(body.nodes, exact);
   for (const double relative : bounds) {
-    CompressedMade made = body.compress(relative);
-    check_layout(made.layout, body.positions.size());
-    EXPECT_LE(made.residual, max_backward_error);
+    columns::CompressedMade made = body.compress(relative);
+    columns::check_layout(made.layout, body.positions.size());
+    EXPECT_LE(made.residual, linalg::max_backward_error);
     EXPECT_LE(made.layout.bound, relative * largest(exact.columns) * (1 + 1e-12)) << name;
-    const auto columns = compressed_columns(std::move(made), body.positions.size());
+    const auto columns = columns::compressed_columns(std::move(made), body.positions.size());
     ASSERT_EQ(columns->nodes(), body.nodes);
     const double error = error_of(*columns, exact.columns);
     EXPECT_LE(error, relative) << name;
@@ -164,12 +166,12 @@ TEST(CompressedColumns, OfTheSurfaceAloneAreWithinTheBoundAndTakeLess) {
   ASSERT_LT(rows + 100, n);
   Collected exact;
   body.maker({}, rows)(body.nodes, exact);
-  CompressedMade made = compress_columns(std::span(body.positions).first(rows), body.nodes, 1e-4,
-                                         body.maker({}, rows), {});
-  check_layout(made.layout, rows);
-  EXPECT_THROW(check_layout(made.layout, n), Error);
+  columns::CompressedMade made = columns::compress_columns(
+      std::span(body.positions).first(rows), body.nodes, 1e-4, body.maker({}, rows), {});
+  columns::check_layout(made.layout, rows);
+  EXPECT_THROW(columns::check_layout(made.layout, n), Error);
   EXPECT_LT(bytes(made), 0.8 * static_cast<double>(bytes(body.compress(1e-4))));
-  const auto columns = compressed_columns(std::move(made), n);
+  const auto columns = columns::compressed_columns(std::move(made), n);
   EXPECT_EQ(columns->node_count(), n);
   EXPECT_EQ(columns->row_nodes(), rows);
   EXPECT_TRUE(columns->has(static_cast<std::uint32_t>(rows - 1)));
@@ -196,7 +198,7 @@ TEST(CompressedColumns, TakeLessOfLargerSolids) {
 
 TEST(CompressedColumns, AnyNumberOfThreadsGivesTheSameBytes) {
   for (const Body& body : {stuffed_ball(1.5), net()}) {
-    const CompressedMade one = body.compress(1e-4, 1), five = body.compress(1e-4, 5);
+    const columns::CompressedMade one = body.compress(1e-4, 1), five = body.compress(1e-4, 5);
     EXPECT_EQ(one.chunks, five.chunks);
     EXPECT_EQ(one.layout.count, five.layout.count);
     EXPECT_EQ(one.layout.clusters.node, five.layout.clusters.node);
@@ -206,7 +208,7 @@ TEST(CompressedColumns, AnyNumberOfThreadsGivesTheSameBytes) {
 
 TEST(CompressedColumns, AreSymmetricBitByBitAndZeroOnFixedAxes) {
   const Body body = net();
-  const auto columns = compressed_columns(body.compress(1e-3), body.positions.size());
+  const auto columns = columns::compressed_columns(body.compress(1e-3), body.positions.size());
   double most = 0;
   for (std::size_t k = 0; k < body.nodes.size(); k += 7)
     for (std::uint32_t other = 0; other < body.positions.size(); other += 5) {
@@ -232,15 +234,15 @@ TEST(CompressedColumns, AreSymmetricBitByBitAndZeroOnFixedAxes) {
 
 TEST(CompressedColumns, BlocksColumnsAndSumsAreOfOneMatrix) {
   const Body body = stuffed_ball(1.5);
-  const auto columns = compressed_columns(body.compress(1e-4), body.positions.size());
+  const auto columns = columns::compressed_columns(body.compress(1e-4), body.positions.size());
   const std::size_t axes = 3 * body.positions.size();
   std::vector<double> read(3 * axes), expected(axes, 0.25), one(expected), five(expected);
   std::mt19937 random(3);
   std::uniform_real_distribution<double> any(-1, 1);
-  std::vector<NodeVector> forces;
+  std::vector<contact::NodeVector> forces;
   double most = 0;
   for (std::size_t k = 0; k < body.nodes.size(); k += 9) {
-    NodeVector force{body.nodes[k], {any(random), any(random), any(random)}};
+    contact::NodeVector force{body.nodes[k], {any(random), any(random), any(random)}};
     if (k % 2 == 0)
       force.value.y = 0;
     forces.push_back(force);
@@ -281,7 +283,8 @@ TEST(CompressedColumns, AnyMatrixIsWithinTheBound) {
   std::vector<std::uint32_t> nodes(120);
   std::iota(nodes.begin(), nodes.end(), 0U);
   double most = 0;
-  const ColumnMaker maker = [&](std::span<const std::uint32_t> of, ColumnSink& sink) {
+  const columns::ColumnMaker maker = [&](std::span<const std::uint32_t> of,
+                                         columns::ColumnSink& sink) {
     for (std::size_t k = 0; k < of.size(); ++k)
       sink.write(k, std::span(c).subspan(std::size_t{of[k]} * 1080, 1080), 0);
     return 0.0;
@@ -289,8 +292,8 @@ TEST(CompressedColumns, AnyMatrixIsWithinTheBound) {
   for (const double x : c)
     most = test::larger(most, std::abs(x));
   for (const double relative : {0.3, 1e-2, 1e-5}) {
-    const auto columns =
-        compressed_columns(compress_columns(positions, nodes, relative, maker, {}), 120);
+    const auto columns = columns::compressed_columns(
+        columns::compress_columns(positions, nodes, relative, maker, {}), 120);
     std::vector<double> read(1080);
     double worst = 0;
     for (std::size_t k = 0; k < 120; ++k) {
@@ -302,41 +305,42 @@ TEST(CompressedColumns, AnyMatrixIsWithinTheBound) {
     EXPECT_GE(worst, relative * most / 10);
   }
   c[5 * 360 + 300] = std::numeric_limits<double>::quiet_NaN();
-  EXPECT_THROW(compress_columns(positions, nodes, 1e-3, maker, {}), Error);
+  EXPECT_THROW(columns::compress_columns(positions, nodes, 1e-3, maker, {}), Error);
 }
 
 TEST(CompressedColumns, WhatContradictsItselfIsRefused) {
   const Body body = net();
-  const CompressedMade made = body.compress(1e-2);
-  const auto refuses = [&](const std::function<void(CompressedLayout&)>& spoil) {
-    CompressedLayout layout = made.layout;
+  const columns::CompressedMade made = body.compress(1e-2);
+  const auto refuses = [&](const std::function<void(columns::CompressedLayout&)>& spoil) {
+    columns::CompressedLayout layout = made.layout;
     spoil(layout);
-    EXPECT_THROW(check_layout(layout, body.positions.size()), Error);
+    EXPECT_THROW(columns::check_layout(layout, body.positions.size()), Error);
   };
-  refuses([](CompressedLayout& l) { l.clusters.node[3] = l.clusters.node[4]; });
-  refuses([](CompressedLayout& l) { l.clusters.node[3] = 1U << 30; });
-  refuses([](CompressedLayout& l) { l.clusters.node.pop_back(); });
-  refuses([](CompressedLayout& l) { l.clusters.first.back() += 1; });
-  refuses([](CompressedLayout& l) { std::swap(l.clusters.first[1], l.clusters.first[2]); });
-  refuses([](CompressedLayout& l) { l.clusters.first.clear(); });
-  refuses([](CompressedLayout& l) { l.with_columns = l.clusters.size() + 1; });
-  refuses([](CompressedLayout& l) { l.count.pop_back(); });
-  refuses([](CompressedLayout& l) { l.count[1].narrow = 1U << 30; });
-  refuses([](CompressedLayout& l) { l.bound = std::numeric_limits<double>::quiet_NaN(); });
-  CompressedMade cut = made;
+  refuses([](columns::CompressedLayout& l) { l.clusters.node[3] = l.clusters.node[4]; });
+  refuses([](columns::CompressedLayout& l) { l.clusters.node[3] = 1U << 30; });
+  refuses([](columns::CompressedLayout& l) { l.clusters.node.pop_back(); });
+  refuses([](columns::CompressedLayout& l) { l.clusters.first.back() += 1; });
+  refuses(
+      [](columns::CompressedLayout& l) { std::swap(l.clusters.first[1], l.clusters.first[2]); });
+  refuses([](columns::CompressedLayout& l) { l.clusters.first.clear(); });
+  refuses([](columns::CompressedLayout& l) { l.with_columns = l.clusters.size() + 1; });
+  refuses([](columns::CompressedLayout& l) { l.count.pop_back(); });
+  refuses([](columns::CompressedLayout& l) { l.count[1].narrow = 1U << 30; });
+  refuses([](columns::CompressedLayout& l) { l.bound = std::numeric_limits<double>::quiet_NaN(); });
+  columns::CompressedMade cut = made;
   cut.chunks[0].pop_back();
-  const auto columns = compressed_columns(std::move(cut), body.positions.size());
+  const auto columns = columns::compressed_columns(std::move(cut), body.positions.size());
   std::vector<double> read(9 * body.positions.size());
   EXPECT_THROW(columns->read(0, read), Error);
-  CompressedMade loud = made;
+  columns::CompressedMade loud = made;
   const double nan = std::numeric_limits<double>::quiet_NaN();
   std::memcpy(loud.chunks[0].data(), &nan, sizeof nan);
-  const auto damaged = compressed_columns(std::move(loud), body.positions.size());
+  const auto damaged = columns::compressed_columns(std::move(loud), body.positions.size());
   EXPECT_THROW(damaged->read(0, read), Error);
-  EXPECT_EQ(chunk_sizes(made.layout).size(), made.chunks.size());
+  EXPECT_EQ(columns::chunk_sizes(made.layout).size(), made.chunks.size());
   for (std::size_t k = 0; k < made.chunks.size(); ++k)
-    EXPECT_EQ(chunk_sizes(made.layout)[k], made.chunks[k].size());
+    EXPECT_EQ(columns::chunk_sizes(made.layout)[k], made.chunks[k].size());
 }
 
 } // namespace
-} // namespace gewebe
+} // namespace gewebe::test

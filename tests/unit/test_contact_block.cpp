@@ -8,7 +8,7 @@
 #include <random>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::test {
 namespace {
 
 Eigen::MatrixXd definite(int size, unsigned seed) {
@@ -21,7 +21,8 @@ Eigen::MatrixXd definite(int size, unsigned seed) {
   return a * a.transpose() + Eigen::MatrixXd::Identity(size, size);
 }
 
-void append(ContactBlock& block, const Eigen::MatrixXd& a, const std::vector<int>& rows, int row) {
+void append(compliance::ContactBlock& block, const Eigen::MatrixXd& a, const std::vector<int>& rows,
+            int row) {
   std::vector<double> entries;
   for (const int other : rows)
     entries.push_back(a(row, other));
@@ -29,7 +30,8 @@ void append(ContactBlock& block, const Eigen::MatrixXd& a, const std::vector<int
   ASSERT_TRUE(block.append(entries));
 }
 
-double error(const ContactBlock& block, const Eigen::MatrixXd& a, const std::vector<int>& rows) {
+double error(const compliance::ContactBlock& block, const Eigen::MatrixXd& a,
+             const std::vector<int>& rows) {
   const Eigen::MatrixXd part = a(rows, rows);
   Eigen::VectorXd x = Eigen::VectorXd::LinSpaced(static_cast<Eigen::Index>(rows.size()), -1, 2);
   const Eigen::VectorXd expected = part.llt().solve(x), product = part * x;
@@ -41,7 +43,7 @@ double error(const ContactBlock& block, const Eigen::MatrixXd& a, const std::vec
 
 TEST(ContactBlock, FollowsRowsThatJoinAndLeave) {
   const Eigen::MatrixXd a = definite(60, 3);
-  ContactBlock block;
+  compliance::ContactBlock block;
   std::vector<int> rows;
   std::mt19937 random(1);
   for (int k = 0; k < 200; ++k) {
@@ -65,7 +67,7 @@ TEST(ContactBlock, FollowsRowsThatJoinAndLeave) {
 }
 
 TEST(ContactBlock, RefusesARowThatDependsOnOthers) {
-  ContactBlock block;
+  compliance::ContactBlock block;
   EXPECT_TRUE(block.append(std::vector<double>{4}));
   EXPECT_FALSE(block.append(std::vector<double>{2, 1}));
   EXPECT_FALSE(block.append(std::vector<double>{2, NAN}));
@@ -78,4 +80,4 @@ TEST(ContactBlock, RefusesARowThatDependsOnOthers) {
 }
 
 } // namespace
-} // namespace gewebe
+} // namespace gewebe::test

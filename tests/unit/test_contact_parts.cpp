@@ -24,23 +24,25 @@
 #include <set>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::test {
 namespace {
 
 /// A bar of 120 x 10 x 10 mm, held at x = 0, with compressed columns.
 struct StoredBar {
-  Model model;
-  CompressedMade made;
+  model::Model model;
+  columns::CompressedMade made;
 
   StoredBar() {
-    SolidModelOptions options;
+    fem::SolidModelOptions options;
     options.material.materials = {{"gel", 1e-3, 20000, 1, 0.2, 0.4}};
-    model = solid_model(test::box_tetrahedra(36, 3, 3, 10.0 / 3), options, {});
-    for (Node& node : model.nodes)
-      node.fixed = node.position.x == 0 ? fixed_all : fixed_none;
+    model = fem::solid_model(test::box_tetrahedra(36, 3, 3, 10.0 / 3), options, {});
+    for (model::Node& node : model.nodes)
+      node.fixed = node.position.x == 0 ? model::fixed_all : model::fixed_none;
     made = test::compressed_surface(model, 1e-5);
   }
-  std::shared_ptr<ComplianceSource> source() const { return test::compressed(model, made); }
+  std::shared_ptr<compliance::ComplianceSource> source() const {
+    return test::compressed(model, made);
+  }
 };
 
 const StoredBar& long_bar() {
@@ -49,9 +51,9 @@ const StoredBar& long_bar() {
 }
 
 TEST(ContactParts, SumsAreThoseOfTheWholeAndBoundsHold) {
-  const std::shared_ptr<ComplianceSource> source = long_bar().source();
-  const CompressedColumns& columns = *source->columns()->compressed();
-  const NodeClusters& clusters = columns.layout().clusters;
+  const std::shared_ptr<compliance::ComplianceSource> source = long_bar().source();
+  const columns::CompressedColumns& columns = *source->columns()->compressed();
+  const columns::NodeClusters& clusters = columns.layout().clusters;
   ASSERT_GT(clusters.size(), 5);
   std::mt19937 random(5);
   std::normal_distribution<double> any;
@@ -59,7 +61,7 @@ TEST(ContactParts, SumsAreThoseOfTheWholeAndBoundsHold) {
     std::set<std::uint32_t> nodes;
     for (int k = 0; k < 1 + round; ++k)
       nodes.insert(static_cast<std::uint32_t>(random() % columns.row_nodes()));
-    std::vector<NodeVector> forces;
+    std::vector<contact::NodeVector> forces;
     for (const std::uint32_t node : nodes)
       forces.push_back({node, {any(random), any(random), any(random)}});
     std::vector<double> whole(3 * columns.row_nodes());
@@ -82,11 +84,11 @@ TEST(ContactParts, SumsAreThoseOfTheWholeAndBoundsHold) {
 }
 
 TEST(ContactParts, TilesThatMayMeetABoxAreFound) {
-  const Model& model = long_bar().model;
+  const model::Model& model = long_bar().model;
   const contact::ModelSurface surface = contact::model_surface(model);
-  const std::shared_ptr<ComplianceSource> source = long_bar().source();
-  const NodeClusters& clusters = source->columns()->compressed()->layout().clusters;
-  const SurfaceTiles tiles(surface, clusters);
+  const std::shared_ptr<compliance::ComplianceSource> source = long_bar().source();
+  const columns::NodeClusters& clusters = source->columns()->compressed()->layout().clusters;
+  const statics::SurfaceTiles tiles(surface, clusters);
   std::vector<std::uint32_t> cluster(clusters.node.size());
   for (std::uint32_t c = 0; c < clusters.size(); ++c)
     for (const std::uint32_t node : clusters.nodes(c))
@@ -109,7 +111,7 @@ TEST(ContactParts, TilesThatMayMeetABoxAreFound) {
     const Vec3 at{120 * any(random), 10 * any(random), 10};
     const Box3 box{at, at + Vec3{3, 3, 3}};
     const std::vector<std::uint32_t> near = tiles.near({&box, 1}, bounds);
-    const SurfacePatch part = tiles.part(near);
+    const statics::SurfacePatch part = tiles.part(near);
     sizes.push_back(part.surface.node.size());
     // The part is what it says.
     for (std::size_t v = 0; v < part.surface.node.size(); ++v) {
@@ -140,22 +142,22 @@ TEST(ContactParts, TilesThatMayMeetABoxAreFound) {
 
 /// A bar in a scene. \param whole  it may touch another object, which is far away: then contact is
 /// looked for all over its surface
-void add_bar(Simulation& s, bool whole) {
-  s.add_object("bar", long_bar().model, Method::ffe, long_bar().source());
+void add_bar(scene::Simulation& s, bool whole) {
+  s.add_object("bar", long_bar().model, scene::Method::ffe, long_bar().source());
   if (!whole)
     return;
-  Model far = solid_model(test::box_tetrahedra(1, 1, 1, 5), {}, {});
-  for (Node& node : far.nodes) {
+  model::Model far = fem::solid_model(test::box_tetrahedra(1, 1, 1, 5), {}, {});
+  for (model::Node& node : far.nodes) {
     node.position.x += 1000;
-    node.fixed = fixed_all;
+    node.fixed = model::fixed_all;
   }
-  s.add_object("far", far, Method::ffe);
-  s.apply(SetContact{0, 1, 0});
+  s.add_object("far", far, scene::Method::ffe);
+  s.apply(scene::SetContact{0, 1, 0});
 }
 
-SetInstrument tool(std::size_t number, double radius, const Vec3& at, double friction,
-                   const Vec3& axis = {}) {
-  SetInstrument set;
+scene::SetInstrument tool(std::size_t number, double radius, const Vec3& at, double friction,
+                          const Vec3& axis = {}) {
+  scene::SetInstrument set;
   set.instrument = number;
   set.shape.radius = radius;
   set.shape.axis = axis;
@@ -175,15 +177,15 @@ struct Told {
 /// bar may touch itself, which it does nowhere: then contact is looked for all over its surface
 /// \param read  shapes are read in each step
 Told rolled(bool whole, bool read) {
-  Simulation s(test::one_thread(), {});
+  scene::Simulation s(test::one_thread(), {});
   add_bar(s, whole);
-  s.apply(SetForce{0, {0, 7}, {10, 20, 5}});
+  s.apply(scene::SetForce{0, {0, 7}, {10, 20, 5}});
   s.apply(tool(0, 6, {60, 5, 17}, 0.3));
   s.apply(tool(1, 3, {80, -5, -4}, 0, {0, 20, 0}));
   s.step(0.01);
   Told told;
   for (int k = 0; k < 40; ++k) {
-    s.apply(MoveInstrument{0, {60 + 0.7 * k, 5, 15.6 - 0.05 * k}, {}, 0.01});
+    s.apply(scene::MoveInstrument{0, {60 + 0.7 * k, 5, 15.6 - 0.05 * k}, {}, 0.01});
     s.step(0.01);
     for (const std::size_t number : {0U, 1U}) {
       told.forces.push_back(s.instrument(number).force);
@@ -222,26 +224,26 @@ TEST(ContactParts, ForcesAreThoseOfTheWholeSurface) {
 // Three tools, one of them held by a spring, anywhere around the bar; one comes and goes.
 TEST(ContactParts, WhereverToolsGoForcesAreThoseOfTheWholeSurface) {
   const auto forces = [](bool whole) {
-    Simulation s(test::one_thread(), {});
+    scene::Simulation s(test::one_thread(), {});
     add_bar(s, whole);
     s.apply(tool(0, 6, {60, 5, 17}, 0));
     s.apply(tool(1, 3, {80, -5, -4}, 0, {0, 20, 0}));
     s.apply(tool(2, 4, {110, 16, 5}, 0));
-    s.apply(SetCoupling{0, Coupling{4000, 0}});
+    s.apply(scene::SetCoupling{0, contact::Coupling{4000, 0}});
     s.step(0.01);
     std::mt19937 random(8);
     std::uniform_real_distribution<double> any(-1, 1);
     std::vector<Vec3> all;
     for (int k = 0; k < 20; ++k) {
       const double x = 70 + 40 * any(random);
-      s.apply(MoveInstrument{0, {x, 5 + any(random), 14.5 + any(random)}, {}, 0.01});
-      s.apply(MoveInstrument{1, {80 + 6 * any(random), -5, -3 + any(random)}, {}, 0.01});
+      s.apply(scene::MoveInstrument{0, {x, 5 + any(random), 14.5 + any(random)}, {}, 0.01});
+      s.apply(scene::MoveInstrument{1, {80 + 6 * any(random), -5, -3 + any(random)}, {}, 0.01});
       if (k % 10 == 6)
-        s.apply(Withdraw{2});
+        s.apply(scene::Withdraw{2});
       else if (k % 10 == 8)
         s.apply(tool(2, 4, {110 + 5 * any(random), 16, 5}, 0));
       else if (k % 10 != 7)
-        s.apply(MoveInstrument{2, {110 + 5 * any(random), 14 + any(random), 5}, {}, 0.01});
+        s.apply(scene::MoveInstrument{2, {110 + 5 * any(random), 14 + any(random), 5}, {}, 0.01});
       s.step(0.01);
       for (const std::size_t number : {0U, 1U, 2U})
         all.push_back(s.instrument(number).force);
@@ -272,13 +274,13 @@ TEST(ContactParts, ForcesDoNotDependOnWhatIsRead) {
 // was out of reach of everything at the beginning.
 TEST(ContactParts, WhatOnlyTheEndOfAStepReachesIsInContact) {
   const auto forces = [&](bool whole) {
-    Simulation s(test::one_thread(), {});
+    scene::Simulation s(test::one_thread(), {});
     add_bar(s, whole);
     s.apply(tool(0, 30, {115, 5, 41}, 0)); // so large that it goes all of its way at once
     s.apply(tool(1, 3, {70, -5, -5}, 0, {0, 20, 0}));
     s.step(0.01);
     EXPECT_EQ(norm(s.instrument(0).force), 0);
-    s.apply(MoveInstrument{0, {115, 5, 32}, {}, 0.01});
+    s.apply(scene::MoveInstrument{0, {115, 5, 32}, {}, 0.01});
     s.step(0.01);
     return std::pair(s.instrument(0).force, s.instrument(1).force);
   };
@@ -292,15 +294,16 @@ TEST(ContactParts, WhatOnlyTheEndOfAStepReachesIsInContact) {
 // Forces on nodes bend the bar so far in one step that it meets an instrument.
 TEST(ContactParts, LoadsPushSurfacesOntoInstruments) {
   for (const bool stored : {true, false}) {
-    Simulation s(test::one_thread(), {});
-    s.add_object("bar", long_bar().model, Method::ffe, stored ? long_bar().source() : nullptr);
+    scene::Simulation s(test::one_thread(), {});
+    s.add_object("bar", long_bar().model, scene::Method::ffe,
+                 stored ? long_bar().source() : nullptr);
     s.apply(tool(0, 3, {80, -5, -9}, 0, {0, 20, 0}));
     s.step(0.01);
     std::vector<std::uint32_t> end;
     for (std::uint32_t i = 0; i < long_bar().model.nodes.size(); ++i)
       if (long_bar().model.nodes[i].position.x > 119)
         end.push_back(i);
-    s.apply(SetForce{0, end, {0, 0, -300}});
+    s.apply(scene::SetForce{0, end, {0, 0, -300}});
     s.step(0.01);
     EXPECT_LT(s.instrument(0).force.z, -100) << stored;
     s.step(0.01);
@@ -309,4 +312,4 @@ TEST(ContactParts, LoadsPushSurfacesOntoInstruments) {
 }
 
 } // namespace
-} // namespace gewebe
+} // namespace gewebe::test

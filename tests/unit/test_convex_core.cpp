@@ -16,7 +16,7 @@
 #include <utility>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::test {
 namespace {
 
 using test::convex_hull_of;
@@ -32,17 +32,17 @@ TEST(ConvexCore, ADistanceFromTheWholeIsSmoothAndItsGradientTheNormal) {
   std::vector<Vec3> points;
   for (int i = 0; i < 30; ++i)
     points.push_back(random_vector(random, 1));
-  const ConvexCore core(convex_hull_of(points));
+  const contact::ConvexCore core(convex_hull_of(points));
   int inside = 0;
   for (int k = 0; k < 5000; ++k) {
     const Vec3 p = random_vector(random, 1.5);
-    const ConvexCore::Nearest at = core.nearest(p);
+    const contact::ConvexCore::Nearest at = core.nearest(p);
     EXPECT_NEAR(norm(at.normal), 1, 1e-14);
     EXPECT_LT(norm(at.point + at.distance * at.normal - p), 1e-14);
     inside += at.distance < 0 ? 1 : 0;
     for (int n = 0; n < 3; ++n) {
       const Vec3 q = p + random_vector(random, 1e-6);
-      const ConvexCore::Nearest there = core.nearest(q);
+      const contact::ConvexCore::Nearest there = core.nearest(q);
       EXPECT_LE(std::fabs(there.distance - at.distance), norm(q - p) * (1 + 1e-9));
       if (at.distance > 0.05) { // so far outside, normals turn by no more than this
         EXPECT_LT(norm(there.normal - at.normal), 1.01 * norm(q - p) / at.distance);
@@ -56,7 +56,7 @@ TEST(ConvexCore, ADistanceFromTheWholeIsSmoothAndItsGradientTheNormal) {
 
 TEST(ConvexCore, FlatPartsBecomeOneFaceHoweverTheyAreDivided) {
   const TriangleMesh box = test::divided_box({2, 3, 4}, 5);
-  const ConvexCore core(box);
+  const contact::ConvexCore core(box);
   EXPECT_EQ(core.faces().size(), 6U);
   EXPECT_EQ(core.edges().size(), 12U);
   EXPECT_EQ(core.corners().size(), 8U);
@@ -66,12 +66,12 @@ TEST(ConvexCore, FlatPartsBecomeOneFaceHoweverTheyAreDivided) {
   TriangleMesh turned = box;
   for (std::size_t k = 0; k < turned.triangles.size(); k += 3)
     std::swap(turned.triangles[k][0], turned.triangles[k][1]);
-  EXPECT_EQ(ConvexCore(turned), core);
+  EXPECT_EQ(contact::ConvexCore(turned), core);
 }
 
 TEST(ConvexCore, WhatIsNoConvexSolidIsRefusedByName) {
   const auto complaint = [](const TriangleMesh& mesh) {
-    return test::complaint([&] { return ConvexCore(mesh); });
+    return test::complaint([&] { return contact::ConvexCore(mesh); });
   };
   const TriangleMesh box = test::divided_box({2, 3, 4}, 1);
   TriangleMesh open = box;
@@ -115,9 +115,9 @@ TEST(ConvexCore, ItsShownSurfaceIsClosedRoundAndItsOwn) {
   for (int i = 0; i < 20; ++i)
     points.push_back(random_vector(random, 3));
   for (const TriangleMesh& mesh : {test::divided_box({2, 3, 4}, 2), convex_hull_of(points)}) {
-    const ConvexCore core(mesh);
+    const contact::ConvexCore core(mesh);
     const double radius = 0.25;
-    const InstrumentSurface shown = hull_surface(core, radius);
+    const contact::InstrumentSurface shown = contact::hull_surface(core, radius);
     TriangleMesh closed;
     closed.points = shown.points;
     closed.triangles = shown.triangles;
@@ -138,4 +138,4 @@ TEST(ConvexCore, ItsShownSurfaceIsClosedRoundAndItsOwn) {
 }
 
 } // namespace
-} // namespace gewebe
+} // namespace gewebe::test

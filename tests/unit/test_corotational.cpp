@@ -18,21 +18,21 @@
 #include <random>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::test {
 namespace {
 
 struct Body {
-  TetMesh mesh;
-  std::vector<SolidMaterial> materials{{2500, 0.45, 1e-3}};
-  std::vector<SolidElement> elements;
-  CorotationalSolid solid;
+  tetrahedra::TetMesh mesh;
+  std::vector<fem::SolidMaterial> materials{{2500, 0.45, 1e-3}};
+  std::vector<fem::SolidElement> elements;
+  fem::CorotationalSolid solid;
 
-  explicit Body(bool quadratic, TetMesh of = test::distorted_box())
-      : mesh(made(std::move(of), quadratic)), elements(solid_elements(mesh, materials)),
+  explicit Body(bool quadratic, tetrahedra::TetMesh of = test::distorted_box())
+      : mesh(made(std::move(of), quadratic)), elements(fem::solid_elements(mesh, materials)),
         solid(mesh, elements) {}
-  static TetMesh made(TetMesh of, bool quadratic) {
+  static tetrahedra::TetMesh made(tetrahedra::TetMesh of, bool quadratic) {
     if (quadratic)
-      make_quadratic(of);
+      tetrahedra::make_quadratic(of);
     return of;
   }
   std::vector<double> rest() const {
@@ -41,12 +41,13 @@ struct Body {
       x.insert(x.end(), {p.x, p.y, p.z});
     return x;
   }
-  double energy(const std::vector<double>& x, const CorotationalWeights& weights = {},
+  double energy(const std::vector<double>& x, const fem::CorotationalWeights& weights = {},
                 const Context& context = {}) {
     std::vector<double> forces(x.size());
     return solid.evaluate(x, weights, forces, context);
   }
-  std::vector<double> forces(const std::vector<double>& x, const CorotationalWeights& weights = {},
+  std::vector<double> forces(const std::vector<double>& x,
+                             const fem::CorotationalWeights& weights = {},
                              const Context& context = {}) {
     std::vector<double> result(x.size());
     (void)solid.evaluate(x, weights, result, context);
@@ -89,7 +90,7 @@ TEST_P(Corotational, ForcesAreTheDerivativeOfTheEnergy) {
   const std::vector<double> x = moved(turned(body.rest(), 0.8), 0.1, 1);
   (void)body.energy(moved(body.rest(), 0.05, 2));
   body.solid.remember();
-  const CorotationalWeights weights{0.7, 0.4};
+  const fem::CorotationalWeights weights{0.7, 0.4};
   const std::vector<double> forces = body.forces(x, weights);
   std::mt19937 random(3);
   for (int n = 0; n < 20; ++n) {
@@ -116,7 +117,7 @@ TEST_P(Corotational, TangentAtRestIsThatOfSmallStrains) {
   EXPECT_LT(largest(body.forces(rest)), 1e-11);
   const std::vector<double> u = moved(std::vector<double>(rest.size()), 1, 4);
   std::vector<double> linear(rest.size()), plus = rest, minus = rest;
-  multiply_solid(body.mesh, body.elements, u, linear);
+  fem::multiply_solid(body.mesh, body.elements, u, linear);
   const double h = 1e-5;
   for (std::size_t k = 0; k < rest.size(); ++k) {
     plus[k] += h * u[k];
@@ -152,7 +153,7 @@ TEST_P(Corotational, TurnedBodiesFeelNothingAndForcesHaveNoSumOrMoment) {
 
 /// The energy of a linear element by another way to R: the stretches of F by their squares, signed.
 TEST(CorotationalElement, FlatAndInvertedElementsHaveTheNearestRotation) {
-  TetMesh mesh;
+  tetrahedra::TetMesh mesh;
   mesh.points = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
   mesh.tetrahedra = {{0, 1, 2, 3}};
   Body body(false, mesh);
@@ -179,7 +180,7 @@ TEST(CorotationalElement, FlatAndInvertedElementsHaveTheNearestRotation) {
     const std::vector<double> forces = body.forces(x);
     EXPECT_NEAR(body.energy(x), expected, 1e-9 * volume * mu) << a << " " << b << " " << c;
     EXPECT_LT(largest(forces), 100 * (lambda + mu) * volume);
-    const SolidBlock r = body.solid.frame(0).rotation;
+    const fem::SolidBlock r = body.solid.frame(0).rotation;
     for (std::size_t i = 0; i < 3; ++i)
       for (std::size_t j = 0; j < 3; ++j)
         EXPECT_NEAR(r[i] * r[j] + r[3 + i] * r[3 + j] + r[6 + i] * r[6 + j], i == j ? 1 : 0, 1e-9);
@@ -227,4 +228,4 @@ INSTANTIATE_TEST_SUITE_P(Order, Corotational, testing::Values(false, true),
                          [](const auto& of) { return of.param ? "quadratic" : "linear"; });
 
 } // namespace
-} // namespace gewebe
+} // namespace gewebe::test

@@ -19,7 +19,7 @@ namespace {
 using namespace gewebe;
 using namespace gewebe::test;
 
-const GridTransform unit_lattice = uniform_transform(1);
+const volume::GridTransform unit_lattice = volume::uniform_transform(1);
 
 Context with(int threads, CpuLevel cpu = best_cpu_level()) {
   Context context;
@@ -28,11 +28,12 @@ Context with(int threads, CpuLevel cpu = best_cpu_level()) {
   return context;
 }
 
-Grid exact(const TriangleMesh& mesh, const GridTransform& t = unit_lattice,
-           CoverageReport* report = nullptr) {
-  std::optional<Grid> grid = exact_coverage(with(1), mesh, t, OpenMesh::refuse, report);
+volume::Grid exact(const TriangleMesh& mesh, const volume::GridTransform& t = unit_lattice,
+                   antialiasing::CoverageReport* report = nullptr) {
+  std::optional<volume::Grid> grid =
+      antialiasing::exact_coverage(with(1), mesh, t, voxelization::OpenMesh::refuse, report);
   EXPECT_TRUE(grid.has_value());
-  return grid.has_value() ? *std::move(grid) : Grid();
+  return grid.has_value() ? *std::move(grid) : volume::Grid();
 }
 
 double length_in_voxel(double low, double high, std::int32_t n) {
@@ -40,8 +41,8 @@ double length_in_voxel(double low, double high, std::int32_t n) {
 }
 
 /// Largest difference to the box's product of lengths over all voxels about it.
-double box_error(const Grid& grid, const Vec3& low, const Vec3& high) {
-  GridAccessor value(grid);
+double box_error(const volume::Grid& grid, const Vec3& low, const Vec3& high) {
+  volume::GridAccessor value(grid);
   double worst = 0;
   const auto from = [](double x) { return static_cast<std::int32_t>(std::floor(x)) - 2; };
   for (std::int32_t i = from(low.x); i < high.x + 3; ++i)
@@ -60,7 +61,7 @@ TEST(Coverage, BoxesAtEveryEighth) {
     for (int eighth = 0; eighth < 8; ++eighth) {
       const double o = eighth / 8.0, s = size * 0.75;
       const Vec3 low{o - 3, o / 2, -o - 20}, high = low + Vec3{s, s, s};
-      const Grid grid = exact(box_mesh(low, high));
+      const volume::Grid grid = exact(box_mesh(low, high));
       ASSERT_EQ(box_error(grid, low, high), 0) << "size " << s << " offset " << o; // all are dyadic
     }
 }
@@ -75,8 +76,8 @@ TEST(Coverage, BoxesAnywhere) {
       low[a] = std::fmin(p, q);
       high[a] = std::fmax(p, q);
     }
-    CoverageReport report;
-    const Grid grid = exact(box_mesh(low, high), unit_lattice, &report);
+    antialiasing::CoverageReport report;
+    const volume::Grid grid = exact(box_mesh(low, high), unit_lattice, &report);
     ASSERT_LT(box_error(grid, low, high), 6e-8);
     const Vec3 s = high - low;
     ASSERT_LT(std::fabs(report.volume / (s.x * s.y * s.z) - 1), 1e-12);
@@ -91,12 +92,12 @@ TEST(Coverage, WallsThinnerThanAVoxel) {
       const auto turned = [&](const Vec3& p) {
         return Vec3{p[turn], p[(turn + 1) % 3], p[(turn + 2) % 3]};
       };
-      CoverageReport report;
-      const Grid grid = exact(box_mesh(turned(low), turned(high)), unit_lattice, &report);
+      antialiasing::CoverageReport report;
+      const volume::Grid grid = exact(box_mesh(turned(low), turned(high)), unit_lattice, &report);
       EXPECT_LT(box_error(grid, turned(low), turned(high)), 6e-8);
       EXPECT_LT(std::fabs(report.volume / (19.9 * 15.3 * (high.z - low.z)) - 1),
                 1e-12 + 1e-14 / thickness);
-      GridAccessor value(grid);
+      volume::GridAccessor value(grid);
       EXPECT_NEAR(static_cast<double>(value.value({0, 0, 0})), std::fmin(thickness, 0.2), 1e-7);
     }
   }
@@ -111,9 +112,9 @@ TEST(Coverage, HalfSpacesOfTetrahedra) {
     corner.points = {o, o + Vec3{s, 0, 0}, o + Vec3{0, s, 0}, o + Vec3{0, 0, s}};
     corner.triangles = {{0, 2, 1}, {0, 1, 3}, {0, 3, 2}, {1, 2, 3}};
     const auto cube = [](double x) { return x > 0 ? x * x * x / 6 : 0; };
-    CoverageReport report;
-    const Grid grid = exact(corner, unit_lattice, &report);
-    EXPECT_NEAR(static_cast<double>(GridAccessor(grid).value({0, 0, 0})),
+    antialiasing::CoverageReport report;
+    const volume::Grid grid = exact(corner, unit_lattice, &report);
+    EXPECT_NEAR(static_cast<double>(volume::GridAccessor(grid).value({0, 0, 0})),
                 cube(s) - 3 * cube(s - 1) + 3 * cube(s - 2), 6e-8);
     EXPECT_LT(std::fabs(report.volume - s * s * s / 6), 1e-15 * 10);
   }
@@ -123,12 +124,12 @@ TEST(Coverage, SumIsTheSignedVolume) {
   for (int levels = 0; levels <= 4; ++levels)
     for (const double radius : {0.3, 3.0, 30.0}) {
       const TriangleMesh mesh = sphere_mesh(levels, radius, {0.1, -0.2, 0.3});
-      CoverageReport report;
-      const Grid grid = exact(mesh, unit_lattice, &report);
+      antialiasing::CoverageReport report;
+      const volume::Grid grid = exact(mesh, unit_lattice, &report);
       const double volume = signed_volume(mesh);
       EXPECT_LT(std::fabs(report.winding_volume / volume - 1), 1e-12);
       EXPECT_LT(std::fabs(report.volume / volume - 1), 1e-12);
-      const double written = volume_stats(with(1), grid).volume;
+      const double written = volume::volume_stats(with(1), grid).volume;
       // Rounding to float is fair: what is left falls with the root of the number of voxels.
       EXPECT_LT(std::fabs(written / volume - 1), radius > 20 ? 1e-9 : 1e-7);
       EXPECT_EQ(report.overlap_voxels, 0u);
@@ -142,7 +143,7 @@ TEST(Coverage, FarAwayAndScaled) {
     TriangleMesh moved = mesh;
     for (Vec3& p : moved.points)
       p += Vec3{offset, -offset, offset};
-    CoverageReport report;
+    antialiasing::CoverageReport report;
     exact(moved, unit_lattice, &report);
     EXPECT_LT(std::fabs(report.volume / volume - 1), 1e-12 + 1e-15 * offset);
   }
@@ -150,8 +151,8 @@ TEST(Coverage, FarAwayAndScaled) {
     TriangleMesh scaled = mesh;
     for (Vec3& p : scaled.points)
       p *= scale;
-    CoverageReport report;
-    exact(scaled, uniform_transform(scale), &report);
+    antialiasing::CoverageReport report;
+    exact(scaled, volume::uniform_transform(scale), &report);
     EXPECT_LT(std::fabs(report.volume / (volume * scale * scale * scale) - 1), 1e-12);
   }
 }
@@ -165,9 +166,10 @@ TEST(Coverage, AgreesWithSamples) {
   TriangleMesh bar = box_mesh({-9, -0.3, -0.2}, {9, 0.4, 0.3});
   rotate(bar, 0.7);
   for (const TriangleMesh& m : {mesh, bar}) {
-    const Grid fractions = exact(m);
-    const Grid counts = voxelize(with(1), m, unit_lattice, {.samples = samples});
-    GridAccessor a(fractions), b(counts);
+    const volume::Grid fractions = exact(m);
+    const volume::Grid counts =
+        voxelization::voxelize(with(1), m, unit_lattice, {.samples = samples});
+    volume::GridAccessor a(fractions), b(counts);
     double worst = 0, sum = 0, total = 0;
     for (std::int32_t i = -10; i <= 10; ++i)
       for (std::int32_t j = -10; j <= 10; ++j)
@@ -196,11 +198,11 @@ TEST(Coverage, PointsOnTheLattice) {
       p = n % 2 == 0
               ? Vec3{std::round(2 * p.x) / 2, std::round(2 * p.y) / 2, std::round(2 * p.z) / 2}
               : Vec3{halves(random) / 2.0, halves(random) / 2.0, halves(random) / 2.0};
-    CoverageReport report;
-    const Grid grid = exact(mesh, unit_lattice, &report);
+    antialiasing::CoverageReport report;
+    const volume::Grid grid = exact(mesh, unit_lattice, &report);
     const double volume = std::fabs(signed_volume(mesh));
     EXPECT_LT(std::fabs(std::fabs(report.winding_volume) - volume), 1e-12 * (100 + volume));
-    const VolumeStats stats = volume_stats(with(1), grid);
+    const volume::VolumeStats stats = volume::volume_stats(with(1), grid);
     EXPECT_GE(stats.min, 0);
     EXPECT_LE(stats.max, 1);
   }
@@ -217,21 +219,21 @@ TEST(Coverage, NestedShellsAreHollowWhateverTheirOrientation) {
         std::swap(t[1], t[2]);
     append(mesh, inner);
     append(mesh, sphere_mesh(2, 4, {0.1, 0, 0.2}));
-    CoverageReport report;
-    const Grid grid = exact(mesh, unit_lattice, &report);
+    antialiasing::CoverageReport report;
+    const volume::Grid grid = exact(mesh, unit_lattice, &report);
     const double core = signed_volume(sphere_mesh(2, 4, {0.1, 0, 0.2}));
     EXPECT_LT(std::fabs(report.volume / (volume + core) - 1), 1e-12);
-    EXPECT_EQ(GridAccessor(grid).value({0, 0, 0}), 1.0f);
-    EXPECT_EQ(GridAccessor(grid).value({6, 0, 0}), 0.0f);
+    EXPECT_EQ(volume::GridAccessor(grid).value({0, 0, 0}), 1.0f);
+    EXPECT_EQ(volume::GridAccessor(grid).value({6, 0, 0}), 0.0f);
   }
 }
 
 TEST(Coverage, OverlapsAreLeftOutAsByParity) {
   TriangleMesh mesh = box_mesh({0.1, 0.2, 0.3}, {8.1, 8.2, 8.3});
   append(mesh, box_mesh({4.1, -2.3, -2.4}, {12.1, 6.2, 6.3}));
-  CoverageReport report;
-  const Grid grid = exact(mesh, unit_lattice, &report);
-  GridAccessor value(grid);
+  antialiasing::CoverageReport report;
+  const volume::Grid grid = exact(mesh, unit_lattice, &report);
+  volume::GridAccessor value(grid);
   EXPECT_EQ(value.value({6, 3, 3}), 0.0f); // in both
   EXPECT_EQ(value.value({2, 3, 3}), 1.0f);
   EXPECT_EQ(value.value({10, 0, 0}), 1.0f);
@@ -244,14 +246,14 @@ TEST(Coverage, OverlapsAreLeftOutAsByParity) {
 TEST(Coverage, OrientationAndOrderDoNotMatter) {
   TriangleMesh mesh = sphere_mesh(3, 9.7, {0.3, 0.1, 0.2});
   append(mesh, sphere_mesh(2, 5.1, {0.3, 0.1, 0.2}));
-  CoverageReport expected, report;
-  const Grid a = exact(mesh, unit_lattice, &expected);
+  antialiasing::CoverageReport expected, report;
+  const volume::Grid a = exact(mesh, unit_lattice, &expected);
   std::mt19937 random(7);
   for (Triangle& t : mesh.triangles)
     std::shuffle(t.begin(), t.end(), random);
-  const Grid b = exact(mesh, unit_lattice, &report);
+  const volume::Grid b = exact(mesh, unit_lattice, &report);
   EXPECT_LT(std::fabs(report.volume / expected.volume - 1), 1e-13);
-  GridAccessor x(a), y(b);
+  volume::GridAccessor x(a), y(b);
   for (std::int32_t i = -11; i < 11; ++i)
     for (std::int32_t j = -11; j < 11; ++j)
       for (std::int32_t k = -11; k < 11; ++k)
@@ -262,8 +264,8 @@ TEST(Coverage, TouchingSolidsAddUp) {
   const TriangleMesh whole = box_mesh({-2.3, -2.3, -2.3}, {7.4, 7.4, 7.4});
   TriangleMesh parts = box_mesh({-2.3, -2.3, -2.3}, {7.4, 7.4, 3.2});
   append(parts, box_mesh({-2.3, -2.3, 3.2}, {7.4, 7.4, 7.4})); // the shared face twice
-  const Grid a = exact(whole), b = exact(parts);
-  GridAccessor x(a), y(b);
+  const volume::Grid a = exact(whole), b = exact(parts);
+  volume::GridAccessor x(a), y(b);
   for (std::int32_t i = -4; i < 10; ++i)
     for (std::int32_t j = -4; j < 10; ++j)
       for (std::int32_t k = -4; k < 10; ++k)
@@ -291,16 +293,19 @@ TEST(Coverage, SolidsSetIntoEachOtherAddUp) {
     mesh.triangles.push_back({p, q + base, p + base});
   }
   append(mesh, plug);
-  CoverageReport report;
-  const Grid grid = exact(mesh, unit_lattice, &report);
+  antialiasing::CoverageReport report;
+  const volume::Grid grid = exact(mesh, unit_lattice, &report);
   EXPECT_LT(box_error(grid, a, b), 1.2e-7);
 }
 
 TEST(Coverage, SameBytesForAnyThreadsAndProcessor) {
   const TriangleMesh mesh = sphere_mesh(4, 60, {0.3, 0.1, 0.2});
   const auto digests = [&](const Context& context) {
-    return std::array{exact_coverage(context, mesh, unit_lattice, OpenMesh::refuse)->digest(),
-                      line_coverage(context, mesh, unit_lattice, 3, OpenMesh::refuse).digest()};
+    return std::array{
+        antialiasing::exact_coverage(context, mesh, unit_lattice, voxelization::OpenMesh::refuse)
+            ->digest(),
+        antialiasing::line_coverage(context, mesh, unit_lattice, 3, voxelization::OpenMesh::refuse)
+            .digest()};
   };
   const auto expected = digests(with(1));
   EXPECT_EQ(digests(with(2)), expected);
@@ -312,19 +317,20 @@ TEST(Coverage, LinesAreExactAlongThemselves) {
   // A box whose walls along the rays lie between voxels: any number of rays gives the fractions.
   const Vec3 low{-3.5, -2.5, 0.3}, high{4.5, 5.5, 7.9};
   for (const int rays : {1, 2, 5}) {
-    CoverageReport report;
-    const Grid grid =
-        line_coverage(with(1), box_mesh(low, high), unit_lattice, rays, OpenMesh::refuse, &report);
+    antialiasing::CoverageReport report;
+    const volume::Grid grid = antialiasing::line_coverage(
+        with(1), box_mesh(low, high), unit_lattice, rays, voxelization::OpenMesh::refuse, &report);
     EXPECT_LT(box_error(grid, low, high), 6e-8);
     EXPECT_EQ(report.mesh.odd_rays, 0u);
   }
   // Else the error falls as rays become more.
   const TriangleMesh mesh = sphere_mesh(3, 8, {0.1, 0.2, 0.3});
-  const Grid fractions = exact(mesh);
+  const volume::Grid fractions = exact(mesh);
   double last = 1;
   for (const int rays : {1, 4, 16}) {
-    const Grid grid = line_coverage(with(1), mesh, unit_lattice, rays, OpenMesh::refuse);
-    GridAccessor a(fractions), b(grid);
+    const volume::Grid grid = antialiasing::line_coverage(with(1), mesh, unit_lattice, rays,
+                                                          voxelization::OpenMesh::refuse);
+    volume::GridAccessor a(fractions), b(grid);
     double sum = 0;
     for (std::int32_t i = -9; i < 10; ++i)
       for (std::int32_t j = -9; j < 10; ++j)
@@ -338,15 +344,23 @@ TEST(Coverage, LinesAreExactAlongThemselves) {
 TEST(Coverage, OpenMeshes) {
   TriangleMesh open = box_mesh({0.2, 0.2, 0.2}, {10.2, 10.2, 10.2});
   open.triangles.erase(open.triangles.begin(), open.triangles.begin() + 2);
-  EXPECT_THROW(exact_coverage(with(1), open, unit_lattice, OpenMesh::refuse), Error);
-  EXPECT_THROW(line_coverage(with(1), open, unit_lattice, 2, OpenMesh::refuse), Error);
-  CoverageReport report;
-  EXPECT_FALSE(exact_coverage(with(1), open, unit_lattice, OpenMesh::skip, &report).has_value());
+  EXPECT_THROW(
+      antialiasing::exact_coverage(with(1), open, unit_lattice, voxelization::OpenMesh::refuse),
+      Error);
+  EXPECT_THROW(
+      antialiasing::line_coverage(with(1), open, unit_lattice, 2, voxelization::OpenMesh::refuse),
+      Error);
+  antialiasing::CoverageReport report;
+  EXPECT_FALSE(antialiasing::exact_coverage(with(1), open, unit_lattice,
+                                            voxelization::OpenMesh::skip, &report)
+                   .has_value());
   EXPECT_EQ(report.mesh.boundary_edges, 4u);
-  line_coverage(with(1), open, unit_lattice, 2, OpenMesh::skip, &report);
+  antialiasing::line_coverage(with(1), open, unit_lattice, 2, voxelization::OpenMesh::skip,
+                              &report);
   EXPECT_EQ(report.mesh.odd_rays, 400u);
   EXPECT_EQ(report.volume, 0);
-  const auto filled = exact_coverage(with(1), open, unit_lattice, OpenMesh::fill, &report);
+  const auto filled = antialiasing::exact_coverage(with(1), open, unit_lattice,
+                                                   voxelization::OpenMesh::fill, &report);
   ASSERT_TRUE(filled.has_value());
   EXPECT_EQ(report.mesh.holes, 1u);
   EXPECT_LT(box_error(*filled, {0.2, 0.2, 0.2}, {10.2, 10.2, 10.2}), 6e-8);
@@ -356,18 +370,32 @@ TEST(Coverage, BadInputAndMemory) {
   const TriangleMesh mesh = sphere_mesh(3, 50, {0, 0, 0});
   Context context = with(1);
   context.max_memory = std::uint64_t{1} << 30;
-  EXPECT_THROW(exact_coverage(context, mesh, uniform_transform(1e-6), OpenMesh::refuse), Error);
-  EXPECT_THROW(line_coverage(context, mesh, uniform_transform(1e-6), 2, OpenMesh::refuse), Error);
-  EXPECT_THROW(exact_coverage(with(1), {}, unit_lattice, OpenMesh::refuse), Error);
-  EXPECT_THROW(exact_coverage(with(1), mesh, uniform_transform(1e-9), OpenMesh::refuse), Error);
-  EXPECT_THROW(line_coverage(with(1), mesh, unit_lattice, 0, OpenMesh::refuse), Error);
-  EXPECT_THROW(line_coverage(with(1), mesh, unit_lattice, 65, OpenMesh::refuse), Error);
-  GridTransform flat = unit_lattice;
+  EXPECT_THROW(antialiasing::exact_coverage(context, mesh, volume::uniform_transform(1e-6),
+                                            voxelization::OpenMesh::refuse),
+               Error);
+  EXPECT_THROW(antialiasing::line_coverage(context, mesh, volume::uniform_transform(1e-6), 2,
+                                           voxelization::OpenMesh::refuse),
+               Error);
+  EXPECT_THROW(
+      antialiasing::exact_coverage(with(1), {}, unit_lattice, voxelization::OpenMesh::refuse),
+      Error);
+  EXPECT_THROW(antialiasing::exact_coverage(with(1), mesh, volume::uniform_transform(1e-9),
+                                            voxelization::OpenMesh::refuse),
+               Error);
+  EXPECT_THROW(
+      antialiasing::line_coverage(with(1), mesh, unit_lattice, 0, voxelization::OpenMesh::refuse),
+      Error);
+  EXPECT_THROW(
+      antialiasing::line_coverage(with(1), mesh, unit_lattice, 65, voxelization::OpenMesh::refuse),
+      Error);
+  volume::GridTransform flat = unit_lattice;
   flat.m[0] = 2;
-  EXPECT_THROW(exact_coverage(with(1), mesh, flat, OpenMesh::refuse), Error);
+  EXPECT_THROW(antialiasing::exact_coverage(with(1), mesh, flat, voxelization::OpenMesh::refuse),
+               Error);
   for (const double radius : {3.0, 30.0, 100.0}) {
     const TriangleMesh ball = sphere_mesh(3, radius, {0, 0, 0});
-    EXPECT_LT(static_cast<double>(exact(ball).memory_bytes()), coverage_bytes(ball, unit_lattice));
+    EXPECT_LT(static_cast<double>(exact(ball).memory_bytes()),
+              antialiasing::coverage_bytes(ball, unit_lattice));
   }
 }
 
@@ -377,29 +405,29 @@ TEST(Orient, OneSidedSurfacesHaveNone) {
                                  {-0.8, 0.6, 0}, {-0.8, -0.6, 0}, {0.3, -1, 0}};
   std::vector<Triangle> triangles{{0, 1, 2}, {0, 2, 3}, {0, 3, 4}, {0, 4, 5}, {0, 5, 1},
                                   {1, 2, 4}, {2, 3, 5}, {3, 4, 1}, {4, 5, 2}, {5, 1, 3}};
-  EXPECT_TRUE(odd_edges(points, triangles).empty());
+  EXPECT_TRUE(mesh::odd_edges(points, triangles).empty());
   const auto before = triangles;
-  EXPECT_FALSE(orient_closed(points, triangles));
+  EXPECT_FALSE(repair::orient_closed(points, triangles));
   EXPECT_EQ(triangles, before);
 }
 
 TEST(Orient, MendsAndTurns) {
   TriangleMesh mesh = sphere_mesh(2, 5, {});
-  OrientReport report;
-  EXPECT_TRUE(orient_closed(mesh.points, mesh.triangles, &report));
+  repair::OrientReport report;
+  EXPECT_TRUE(repair::orient_closed(mesh.points, mesh.triangles, &report));
   EXPECT_EQ(report.flipped, 0u);
   EXPECT_EQ(report.parts, 1u);
   for (Triangle& t : mesh.triangles)
     std::swap(t[0], t[1]);
   std::swap(mesh.triangles[7][0], mesh.triangles[7][1]);
   append(mesh, sphere_mesh(1, 2, {}));
-  EXPECT_TRUE(orient_closed(mesh.points, mesh.triangles, &report));
+  EXPECT_TRUE(repair::orient_closed(mesh.points, mesh.triangles, &report));
   EXPECT_EQ(report.parts, 2u);
   EXPECT_EQ(report.flipped, mesh.triangles.size() - 1); // all but the one, the inner ones inward
   EXPECT_NEAR(signed_volume(mesh),
               signed_volume(sphere_mesh(2, 5, {})) - signed_volume(sphere_mesh(1, 2, {})), 1e-9);
   mesh.triangles.pop_back();
-  EXPECT_FALSE(orient_closed(mesh.points, mesh.triangles, &report));
+  EXPECT_FALSE(repair::orient_closed(mesh.points, mesh.triangles, &report));
 }
 
 TEST(Coverage, Organs) {
@@ -407,11 +435,12 @@ TEST(Coverage, Organs) {
     const TriangleMesh mesh = load_test_mesh(name);
     if (mesh.triangles.empty())
       GTEST_SKIP() << "no " << name;
-    const GridTransform lattice = lattice_for_dim(bounding_box(mesh), 128);
-    CoverageReport report;
-    const Grid grid = exact(mesh, lattice, &report);
+    const volume::GridTransform lattice = volume::lattice_for_dim(bounding_box(mesh), 128);
+    antialiasing::CoverageReport report;
+    const volume::Grid grid = exact(mesh, lattice, &report);
     EXPECT_LT(std::fabs(report.winding_volume / signed_volume(mesh) - 1), 1e-12) << name;
-    EXPECT_LT(std::fabs(volume_stats(with(1), grid).volume / report.volume - 1), 1e-9) << name;
+    EXPECT_LT(std::fabs(volume::volume_stats(with(1), grid).volume / report.volume - 1), 1e-9)
+        << name;
   }
 }
 

@@ -8,7 +8,7 @@
 #include <string>
 #include <utility>
 
-namespace gewebe {
+namespace gewebe::test {
 namespace {
 
 /// A square of 4 x 4 mm in z = height, of 8 x 8 cells, turned over if it looks down.
@@ -40,10 +40,10 @@ TEST(SurfaceCrossing, WallsThatAreApartAreCrossedOneByOne) {
   TriangleMesh walls;
   add_square(walls, 0, false);
   add_square(walls, 1e-6, true);
-  const SurfaceCrossing crossing = cross_surfaces(walls, upright_sheet());
+  const mesh::SurfaceCrossing crossing = mesh::cross_surfaces(walls, upright_sheet());
   EXPECT_GT(crossing.curve.size(), 30U);
   double length = 0;
-  for (const SurfaceCrossing::Edge& edge : crossing.curve)
+  for (const mesh::SurfaceCrossing::Edge& edge : crossing.curve)
     length += norm(crossing.a.points[edge.a[1]] - crossing.a.points[edge.a[0]]);
   EXPECT_NEAR(length, 2 * 4 * norm(Vec3{0.595, 6, 0}) / 6, 2e-2);
 }
@@ -54,10 +54,10 @@ TEST(SurfaceCrossing, WallsThatLieOnEachOtherAreRefusedByName) {
   add_square(walls, 0, true);
   for (const bool swapped : {false, true})
     try {
-      (void)(swapped ? cross_surfaces(upright_sheet(), walls)
-                     : cross_surfaces(walls, upright_sheet()));
+      (void)(swapped ? mesh::cross_surfaces(upright_sheet(), walls)
+                     : mesh::cross_surfaces(walls, upright_sheet()));
       ADD_FAILURE();
-    } catch (const MeetingOfNoSheets& error) {
+    } catch (const mesh::MeetingOfNoSheets& error) {
       EXPECT_EQ(std::string(error.what()),
                 "the surfaces meet where one of them lies on itself, expected two sheets");
     }
@@ -68,8 +68,8 @@ TEST(SurfaceCrossing, WhatLiesOnItselfElsewhereIsNoMatter) {
   add_square(walls, 0, false);
   add_square(walls, 0, false, 10);
   add_square(walls, 0, true, 10);
-  EXPECT_GT(cross_surfaces(walls, upright_sheet()).curve.size(), 15U);
+  EXPECT_GT(mesh::cross_surfaces(walls, upright_sheet()).curve.size(), 15U);
 }
 
 } // namespace
-} // namespace gewebe
+} // namespace gewebe::test

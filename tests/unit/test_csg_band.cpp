@@ -13,18 +13,18 @@ namespace {
 using namespace gewebe;
 using namespace gewebe::test;
 
-Grid scene(unsigned seed, std::optional<double> band) {
-  DensityOptions options;
-  options.info.transform = uniform_transform(0.5);
+volume::Grid random_scene(unsigned seed, std::optional<double> band) {
+  density::DensityOptions options;
+  options.info.transform = volume::uniform_transform(0.5);
   options.band = band;
   if (band)
     options.info.isovalue = *band;
-  return metaball_density({}, random_particles(12, 6, 5, {1, 2, 3}, seed), options);
+  return density::metaball_density({}, random_particles(12, 6, 5, {1, 2, 3}, seed), options);
 }
 
 /// Voxels of [-40, 40)³ whose values lie on different sides of `isovalue`.
-int other_sides(const Grid& a, const Grid& b, float isovalue) {
-  GridAccessor of_a(a), of_b(b);
+int other_sides(const volume::Grid& a, const volume::Grid& b, float isovalue) {
+  volume::GridAccessor of_a(a), of_b(b);
   int count = 0;
   for (std::int32_t i = -40; i < 40; ++i)
     for (std::int32_t j = -40; j < 40; ++j)
@@ -34,13 +34,13 @@ int other_sides(const Grid& a, const Grid& b, float isovalue) {
 }
 
 TEST(CsgBand, EveryVoxelKeepsItsSide) {
-  using Op = CsgOperation;
+  using Op = volume::CsgOperation;
   for (unsigned seed = 1; seed <= 3; ++seed) {
-    const Grid a = scene(seed, {}), b = scene(seed + 100, {});
-    const Grid a_band = scene(seed, 0.5), b_band = scene(seed + 100, 0.5);
+    const volume::Grid a = random_scene(seed, {}), b = random_scene(seed + 100, {});
+    const volume::Grid a_band = random_scene(seed, 0.5), b_band = random_scene(seed + 100, 0.5);
     ASSERT_GT(a.leaves().size(), a_band.leaves().size());
     for (const Op op : {Op::unite, Op::intersect, Op::difference, Op::exclusive_or}) {
-      const Grid plain = combine(op, {a, b});
+      const volume::Grid plain = combine(op, {a, b});
       EXPECT_EQ(other_sides(plain, combine(op, {a_band, b}), 0.5F), 0);
       EXPECT_EQ(other_sides(plain, combine(op, {a, b_band}), 0.5F), 0);
       EXPECT_EQ(other_sides(plain, combine(op, {a_band, b_band}), 0.5F), 0);
@@ -49,7 +49,7 @@ TEST(CsgBand, EveryVoxelKeepsItsSide) {
 }
 
 TEST(CsgBand, AtAnotherIsovalueSidesAreLost) {
-  EXPECT_GT(other_sides(scene(1, {}), scene(1, 0.5), 0.9F), 0);
+  EXPECT_GT(other_sides(random_scene(1, {}), random_scene(1, 0.5), 0.9F), 0);
 }
 
 } // namespace

@@ -14,16 +14,16 @@ namespace {
 
 using namespace gewebe;
 using namespace gewebe::test;
-using Op = CsgOperation;
+using Op = volume::CsgOperation;
 
 constexpr std::array all_operations{Op::add,       Op::subtract,   Op::unite,
                                     Op::intersect, Op::difference, Op::exclusive_or};
 
 /// Calls visit(values of the grids at one voxel) for all voxels in [-20, 20)³.
-void for_voxels(const std::vector<Grid>& grids,
+void for_voxels(const std::vector<volume::Grid>& grids,
                 const std::function<void(const std::vector<float>&)>& visit) {
-  std::vector<GridAccessor> accessors;
-  for (const Grid& grid : grids)
+  std::vector<volume::GridAccessor> accessors;
+  for (const volume::Grid& grid : grids)
     accessors.emplace_back(grid);
   std::vector<float> values(grids.size());
   for (std::int32_t i = -20; i < 20; ++i)
@@ -36,28 +36,28 @@ void for_voxels(const std::vector<Grid>& grids,
 }
 
 /// Voxels in which the two differ.
-std::uint64_t differences(const Grid& a, const Grid& b) {
+std::uint64_t differences(const volume::Grid& a, const volume::Grid& b) {
   std::uint64_t count = 0;
   for_voxels({a, b}, [&](const std::vector<float>& v) { count += !(v[0] == v[1]); });
   return count;
 }
 
 /// 1 in all that the random grids may reach.
-Grid universe() {
-  GridBuilder builder{GridInfo{}};
+volume::Grid universe() {
+  volume::GridBuilder builder{volume::GridInfo{}};
   for (std::int32_t i = -128; i < 128; i += 128)
     for (std::int32_t j = -128; j < 128; j += 128)
       for (std::int32_t k = -128; k < 128; k += 128)
         builder.add_tile({{i, j, k}, 128, 1, true});
   return builder.finish(false);
 }
-Grid complement(const Grid& a) {
+volume::Grid complement(const volume::Grid& a) {
   return combine(Op::difference, {universe(), a});
 }
-Grid unite(const Grid& a, const Grid& b) {
+volume::Grid unite(const volume::Grid& a, const volume::Grid& b) {
   return combine(Op::unite, {a, b});
 }
-Grid intersect(const Grid& a, const Grid& b) {
+volume::Grid intersect(const volume::Grid& a, const volume::Grid& b) {
   return combine(Op::intersect, {a, b});
 }
 
@@ -69,7 +69,7 @@ protected:
     b = random_grid(random, 0, 1);
     c = random_grid(random, 0, 1);
   }
-  Grid a, b, c;
+  volume::Grid a, b, c;
 };
 
 TEST_P(CsgAlgebra, HoldsExactlyOnDensitiesFrom0To1) {
@@ -100,15 +100,16 @@ TEST_P(CsgAlgebra, HoldsExactlyOnDensitiesFrom0To1) {
 TEST_P(CsgAlgebra, FalseIdentitiesAreSeen) {
   EXPECT_GT(differences(complement(unite(a, b)), unite(complement(a), complement(b))), 100U);
   EXPECT_GT(differences(unite(a, intersect(a, b)), b), 100U);
-  EXPECT_GT(differences(combine(Op::exclusive_or, {a, a}), Grid()), 100U); // grey, not 0 or 1
-  EXPECT_GT(differences(intersect(a, complement(a)), Grid()), 100U);
+  EXPECT_GT(differences(combine(Op::exclusive_or, {a, a}), volume::Grid()),
+            100U); // grey, not 0 or 1
+  EXPECT_GT(differences(intersect(a, complement(a)), volume::Grid()), 100U);
   EXPECT_GT(differences(complement(complement(a)), a), 100U); // 1 - (1 - a) is rounded
 }
 
 TEST_P(CsgAlgebra, AddThenSubtractGivesBackToOneRoundingWhereNothingWasClamped) {
   std::mt19937 random(static_cast<unsigned>(GetParam()) + 100);
-  const Grid x = random_grid(random, -0.5f, 1.5f), y = random_grid(random, 0, 3);
-  const Grid sum = combine(Op::add, {x, y}), back = combine(Op::subtract, {sum, y});
+  const volume::Grid x = random_grid(random, -0.5f, 1.5f), y = random_grid(random, 0, 3);
+  const volume::Grid sum = combine(Op::add, {x, y}), back = combine(Op::subtract, {sum, y});
   constexpr double epsilon = std::numeric_limits<float>::epsilon();
   std::uint64_t checked = 0, clamped = 0, rounded = 0;
   for_voxels({x, y, back}, [&](const std::vector<float>& v) {
@@ -136,9 +137,9 @@ TEST(CsgOwnership, OperandsThatAreMovedInGiveTheSame) {
   for (int n = 0; n < 4; ++n)
     for (const Op operation : all_operations)
       for (unsigned moved = 1; moved < 8; ++moved) {
-        std::vector<Grid> keep;
+        std::vector<volume::Grid> keep;
         std::vector<std::uint64_t> digests;
-        std::vector<CsgOperand> operands;
+        std::vector<volume::CsgOperand> operands;
         const bool canonical = n % 2 == 0;
         for (unsigned g = 0; g < 3; ++g) {
           const unsigned seed = static_cast<unsigned>(n) * 10 + g;
@@ -150,9 +151,10 @@ TEST(CsgOwnership, OperandsThatAreMovedInGiveTheSame) {
           digests.push_back(keep.back().digest());
           operands.push_back({(moved >> g & 1) != 0 ? make() : keep.back(), ""});
         }
-        CsgReport shared_report, report;
-        const Grid shared = combine(operation, keep, &shared_report);
-        const Grid result = csg(Context{}, operation, std::move(operands), {}, &report);
+        volume::CsgReport shared_report, report;
+        const volume::Grid shared = combine(operation, keep, &shared_report);
+        const volume::Grid result =
+            volume::csg(Context{}, operation, std::move(operands), {}, &report);
         ASSERT_EQ(result.digest(), shared.digest()) << n << " " << moved;
         EXPECT_EQ(report.leaves_computed, shared_report.leaves_computed);
         EXPECT_EQ(report.leaves_shared, shared_report.leaves_shared);
@@ -164,23 +166,25 @@ TEST(CsgOwnership, OperandsThatAreMovedInGiveTheSame) {
 
 TEST(CsgOwnership, UntouchedLeavesStayWhereTheyAre) {
   const auto big = [] {
-    return voxelize(Context{}, sphere_mesh(3, 40, {0, 0, 0}), uniform_transform(1), {.samples = 2});
+    return voxelization::voxelize(Context{}, sphere_mesh(3, 40, {0, 0, 0}),
+                                  volume::uniform_transform(1), {.samples = 2});
   };
   const auto small = [] {
-    return voxelize(Context{}, sphere_mesh(2, 4, {39, 0, 0}), uniform_transform(1), {.samples = 2});
+    return voxelization::voxelize(Context{}, sphere_mesh(2, 4, {39, 0, 0}),
+                                  volume::uniform_transform(1), {.samples = 2});
   };
   for (const bool moved : {true, false}) {
-    Grid a = big();
-    const Grid witness = moved ? Grid() : a;
+    volume::Grid a = big();
+    const volume::Grid witness = moved ? volume::Grid() : a;
     std::vector<std::pair<Int3, const float*>> places;
-    for (const LeafView& leaf : a.leaves())
+    for (const volume::LeafView& leaf : a.leaves())
       places.emplace_back(leaf.origin, leaf.values);
-    std::vector<CsgOperand> operands;
+    std::vector<volume::CsgOperand> operands;
     operands.push_back({std::move(a), "a"});
     operands.push_back({small(), "b"});
-    CsgReport report;
-    const Grid result = csg(Context{}, Op::unite, std::move(operands), {}, &report);
-    GridAccessor accessor(result);
+    volume::CsgReport report;
+    const volume::Grid result = volume::csg(Context{}, Op::unite, std::move(operands), {}, &report);
+    volume::GridAccessor accessor(result);
     std::size_t same = 0;
     for (const auto& [origin, values] : places) {
       float tile = 0;
@@ -194,16 +198,16 @@ TEST(CsgOwnership, UntouchedLeavesStayWhereTheyAre) {
 
 TEST(CsgOwnership, ResultsOfResultsOutliveTheirOperands) {
   std::mt19937 random(9);
-  Grid result = random_grid(random, 0, 1);
-  Grid plain = result;
+  volume::Grid result = random_grid(random, 0, 1);
+  volume::Grid plain = result;
   for (int n = 0; n < 5; ++n) {
     std::mt19937 next(static_cast<unsigned>(n) + 50);
-    const Grid other = random_grid(next, 0, 1);
+    const volume::Grid other = random_grid(next, 0, 1);
     plain = combine(Op::unite, {plain, other});
-    std::vector<CsgOperand> operands;
+    std::vector<volume::CsgOperand> operands;
     operands.push_back({std::move(result), ""});
     operands.push_back({other, ""});
-    result = csg(Context{}, Op::unite, std::move(operands));
+    result = volume::csg(Context{}, Op::unite, std::move(operands));
   }
   EXPECT_EQ(result.digest(), plain.digest());
 }

@@ -11,25 +11,25 @@
 #include <utility>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::test {
 namespace {
 
 constexpr double nan = std::numeric_limits<double>::quiet_NaN();
 
-NumberTable table_of(const std::string& text) {
-  return read_number_table(text, "t.csv");
+formats::NumberTable table_of(const std::string& text) {
+  return formats::read_number_table(text, "t.csv");
 }
 
-CurveSheet sheet_of(const NumberTable& table, const std::string& x,
-                    const std::vector<std::string>& names) {
-  std::vector<const NumberColumn*> ys;
+formats::CurveSheet sheet_of(const formats::NumberTable& table, const std::string& x,
+                             const std::vector<std::string>& names) {
+  std::vector<const formats::NumberColumn*> ys;
   for (const std::string& name : names)
-    ys.push_back(&find_column(table, name));
-  return curve_sheet(find_column(table, x), ys, "");
+    ys.push_back(&formats::find_column(table, name));
+  return formats::curve_sheet(formats::find_column(table, x), ys, "");
 }
 
 TEST(Curves, ATableHasNamesUnitsAndGaps) {
-  const NumberTable table = table_of(
+  const formats::NumberTable table = table_of(
       "time [s],\"a,b\" ,o.1.force [uN],what\r\n# a remark\n0,1,+2e3,x\n1,,nan,\"\"\"\"\n");
   ASSERT_EQ(table.columns.size(), 4U);
   EXPECT_EQ(table.columns[0].name, "time");
@@ -40,8 +40,8 @@ TEST(Curves, ATableHasNamesUnitsAndGaps) {
   EXPECT_TRUE(std::isnan(table.columns[2].values[1]));
   EXPECT_TRUE(std::isnan(table.columns[1].values[1]));
   EXPECT_EQ(table.columns[3].words, "'x' in line 3");
-  EXPECT_EQ(&find_column(table, "force"), &table.columns[2]);
-  EXPECT_EQ(&find_column(table, "o.1.force [uN]"), &table.columns[2]);
+  EXPECT_EQ(&formats::find_column(table, "force"), &table.columns[2]);
+  EXPECT_EQ(&formats::find_column(table, "o.1.force [uN]"), &table.columns[2]);
 }
 
 TEST(Curves, WrongTablesAndNamesAreNamed) {
@@ -55,10 +55,11 @@ TEST(Curves, WrongTablesAndNamesAreNamed) {
             "t.csv:1: a name that is no UTF-8 text, expected names in the first line");
   EXPECT_EQ(test::complaint([] { table_of("a\n\"1\n"); }),
             "t.csv:2: a quote without end, expected '\"' behind it in the same line");
-  const NumberTable table = table_of("t [s],p.force [uN],q.force [uN],w,d [mm]\n0,1,2,x,1e301\n");
-  EXPECT_EQ(test::complaint([&] { find_column(table, "force"); }),
+  const formats::NumberTable table =
+      table_of("t [s],p.force [uN],q.force [uN],w,d [mm]\n0,1,2,x,1e301\n");
+  EXPECT_EQ(test::complaint([&] { formats::find_column(table, "force"); }),
             "several columns 'force', expected one of p.force, q.force");
-  EXPECT_EQ(test::complaint([&] { find_column(table, "forc"); }),
+  EXPECT_EQ(test::complaint([&] { formats::find_column(table, "forc"); }),
             "no column 'forc' (did you mean force?), expected one of t [s], p.force [uN], q.force "
             "[uN], w, d [mm]");
   EXPECT_EQ(test::complaint([&] { sheet_of(table, "t", {"w"}); }),
@@ -69,21 +70,21 @@ TEST(Curves, WrongTablesAndNamesAreNamed) {
             "'p.force [uN]' and 'd [mm]' have different units, expected columns of one unit");
   EXPECT_EQ(test::complaint([&] { sheet_of(table, "t", {"d"}); }),
             "a number beyond 1e300, expected smaller ones");
-  const NumberTable apart = table_of("a,b\n1,\n,2\n");
+  const formats::NumberTable apart = table_of("a,b\n1,\n,2\n");
   EXPECT_EQ(test::complaint([&] { sheet_of(apart, "a", {"b"}); }),
             "no row has numbers of 'a' and 'b', expected some with both");
 }
 
 TEST(Curves, AxesEndAtRoundNumbersThatEncloseAll) {
-  const RoundAxis a = round_axis(0, 6.48, 6);
+  const text::RoundAxis a = text::round_axis(0, 6.48, 6);
   EXPECT_EQ(a.texts, (std::vector<std::string>{"0", "2", "4", "6", "8"}));
-  EXPECT_EQ(round_axis(-0.13, 0.1, 5).texts,
+  EXPECT_EQ(text::round_axis(-0.13, 0.1, 5).texts,
             (std::vector<std::string>{"-0.15", "-0.10", "-0.05", "0.00", "0.05", "0.10"}));
-  EXPECT_EQ(round_axis(0, 1, 5).texts.back(), "1.0");
+  EXPECT_EQ(text::round_axis(0, 1, 5).texts.back(), "1.0");
   for (double size = 1e-290; size < 1e290; size *= 37)
     for (const auto& [min, max] :
          {std::pair{-size, 2 * size}, {0.0, size}, {size, size}, {0.997 * size, size}}) {
-      const RoundAxis axis = round_axis(min, max, 5);
+      const text::RoundAxis axis = text::round_axis(min, max, 5);
       EXPECT_LE(axis.min, min + 1e-8 * size) << size;
       EXPECT_GE(axis.max, max - 1e-8 * size) << size;
       EXPECT_GE(axis.marks.size(), 2U) << size;
@@ -94,8 +95,9 @@ TEST(Curves, AxesEndAtRoundNumbersThatEncloseAll) {
 }
 
 TEST(Curves, LargeNumbersGetALargerUnit) {
-  const NumberTable table = table_of("t [s],f [uN],p [Pa],m [nN m]\n0,23000,999,2e9\n1,-500,0,0\n");
-  const CurveSheet forces = sheet_of(table, "t", {"f"});
+  const formats::NumberTable table =
+      table_of("t [s],f [uN],p [Pa],m [nN m]\n0,23000,999,2e9\n1,-500,0,0\n");
+  const formats::CurveSheet forces = sheet_of(table, "t", {"f"});
   EXPECT_EQ(forces.y.title, "f [mN]");
   EXPECT_EQ(forces.curves[0].y[0], 23);
   EXPECT_EQ(forces.curves[0].y[1], -0.5);
@@ -105,33 +107,34 @@ TEST(Curves, LargeNumbersGetALargerUnit) {
 }
 
 TEST(Curves, SvgBreaksLinesAtGapsAndEscapesNames) {
-  const NumberTable table = table_of("t,a<&> [uN],b [uN]\n0,1,2\n1,2,2\n2,,2\n3,3,2\n4,4,2\n");
-  const std::string one = curves_svg(sheet_of(table, "t", {"a<&>"}), 400, 300);
+  const formats::NumberTable table =
+      table_of("t,a<&> [uN],b [uN]\n0,1,2\n1,2,2\n2,,2\n3,3,2\n4,4,2\n");
+  const std::string one = formats::curves_svg(sheet_of(table, "t", {"a<&>"}), 400, 300);
   EXPECT_NE(one.find("a&lt;&amp;&gt; [\u00b5N]"), std::string::npos);
   const std::size_t path = one.find("stroke-linejoin");
   const std::string curve = one.substr(one.rfind("<path", path), path - one.rfind("<path", path));
   EXPECT_EQ(std::count(curve.begin(), curve.end(), 'M'), 2);
-  const std::string two = curves_svg(sheet_of(table, "t", {"a<&>", "b"}), 400, 300);
+  const std::string two = formats::curves_svg(sheet_of(table, "t", {"a<&>", "b"}), 400, 300);
   EXPECT_NE(two.find(">b</text>"), std::string::npos);
   EXPECT_EQ(one.find("nan"), std::string::npos);
 }
 
 TEST(Curves, LettersStandWhereThePointsAre) {
-  CurveSheet sheet;
+  formats::CurveSheet sheet;
   sheet.x = {0, 10, {0, 10}, {"0", "10"}, "x [mm]"};
   sheet.y = {0, 1, {0, 1}, {"0", "1"}, "y"};
   sheet.curves = {{"c", {0, 5, nan, 10}, {0, 0.5, 1, 1}}};
-  EXPECT_EQ(curves_ascii(sheet, 40, 10), "y\n"
-                                         "1 +                                *\n"
-                                         "  |\n"
-                                         "  |                *\n"
-                                         "  |\n"
-                                         "  |\n"
-                                         "0 +*\n"
-                                         "  ++-------------------------------+\n"
-                                         "   0                              10\n"
-                                         "                              x [mm]\n");
+  EXPECT_EQ(formats::curves_ascii(sheet, 40, 10), "y\n"
+                                                  "1 +                                *\n"
+                                                  "  |\n"
+                                                  "  |                *\n"
+                                                  "  |\n"
+                                                  "  |\n"
+                                                  "0 +*\n"
+                                                  "  ++-------------------------------+\n"
+                                                  "   0                              10\n"
+                                                  "                              x [mm]\n");
 }
 
 } // namespace
-} // namespace gewebe
+} // namespace gewebe::test

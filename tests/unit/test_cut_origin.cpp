@@ -20,8 +20,8 @@ namespace {
 
 /// Opens the surface between triangles on both sides of a plane, where they are in front of
 /// another.
-Cut opened(const Model& model, double x, double above) {
-  Cut cut;
+cutting::Cut opened(const model::Model& model, double x, double above) {
+  cutting::Cut cut;
   std::map<std::array<std::uint32_t, 2>, int> sides;
   for (const Triangle& t : model.triangles) {
     Vec3 middle;
@@ -40,50 +40,51 @@ Cut opened(const Model& model, double x, double above) {
   return cut;
 }
 
-Model ball_model() {
-  Model model = model_of(ball(3, 20));
-  for (std::size_t i = 0; i < surface_count(model); i += 17)
-    model.nodes[i].fixed = fixed_all;
+model::Model ball_model() {
+  model::Model model = model_of(ball(3, 20));
+  for (std::size_t i = 0; i < model::surface_count(model); i += 17)
+    model.nodes[i].fixed = model::fixed_all;
   return model;
 }
 
 TEST(CutOrigin, FindsWhatTheCutSays) {
-  const Model before = ball_model();
-  const CutModel cut = cut_model(before, opened(before, 1, 5));
+  const model::Model before = ball_model();
+  const cutting::CutModel cut = cutting::cut_model(before, opened(before, 1, 5));
   ASSERT_GT(cut.doubled, 5u);
-  const CutOrigin found = find_cut_origin(before, cut.model);
+  const cutting::CutOrigin found = cutting::find_cut_origin(before, cut.model);
   EXPECT_EQ(found.origin, cut.origin);
   EXPECT_EQ(found.place, cut.place);
 }
 
 TEST(CutOrigin, CopiesOfCopiesGoToTheirSide) {
-  const Model before = ball_model();
-  const CutModel first = cut_model(before, opened(before, 1, 8));
-  const CutModel second = cut_model(first.model, opened(first.model, 1, 0));
+  const model::Model before = ball_model();
+  const cutting::CutModel first = cutting::cut_model(before, opened(before, 1, 8));
+  const cutting::CutModel second = cutting::cut_model(first.model, opened(first.model, 1, 0));
   ASSERT_GT(second.doubled, 1u);
-  const CutOrigin found = find_cut_origin(first.model, second.model);
+  const cutting::CutOrigin found = cutting::find_cut_origin(first.model, second.model);
   EXPECT_EQ(found.origin, second.origin);
   EXPECT_EQ(found.place, second.place);
 }
 
 TEST(CutOrigin, TheRankIsThreeForEachCopyAndOneForEachSeveredSpring) {
-  const Model before = ball_model();
-  Cut cut = opened(before, 1, 5);
-  const CutModel open = cut_model(before, cut);
+  const model::Model before = ball_model();
+  cutting::Cut cut = opened(before, 1, 5);
+  const cutting::CutModel open = cutting::cut_model(before, cut);
   std::size_t fixed = 0;
   for (std::size_t i = 0; i < open.model.nodes.size(); ++i)
-    if (open.place[open.origin[i]] != i && open.model.nodes[i].fixed == fixed_all)
+    if (open.place[open.origin[i]] != i && open.model.nodes[i].fixed == model::fixed_all)
       ++fixed;
-  const StiffnessChange change = stiffness_change(before, open.model, open.origin, open.place);
+  const update::StiffnessChange change =
+      update::stiffness_change(before, open.model, open.origin, open.place);
   EXPECT_LE(change.rank(), 3 * (open.doubled - fixed) + open.removed);
   EXPECT_GE(change.rank(), 3 * (open.doubled - fixed));
 }
 
 TEST(CutOrigin, AnotherModelIsRefused) {
-  const Model before = ball_model();
-  Model other = before;
+  const model::Model before = ball_model();
+  model::Model other = before;
   other.nodes[7].position.z += 1e-12;
-  EXPECT_THROW((void)find_cut_origin(before, other), Error);
+  EXPECT_THROW((void)cutting::find_cut_origin(before, other), Error);
 }
 
 } // namespace

@@ -16,13 +16,13 @@
 #include <utility>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::test {
 namespace {
 
 constexpr double cell = 0.2, reach = 0.6;
 
-Skin skin_of(const TriangleMesh& mesh) {
-  Skin skin;
+model::Skin skin_of(const TriangleMesh& mesh) {
+  model::Skin skin;
   skin.points = mesh.points;
   skin.triangles = mesh.triangles;
   skin.tetrahedron.assign(mesh.points.size(), 0);
@@ -39,22 +39,22 @@ Skin skin_of(const TriangleMesh& mesh) {
 }
 
 /// Of radius 1 about 0.
-Skin ball_skin() {
+model::Skin ball_skin() {
   return skin_of(test::ball(4, 1, {0, 0, 0}));
 }
 
-TriangleMesh mesh_of(const Skin& skin) {
+TriangleMesh mesh_of(const model::Skin& skin) {
   TriangleMesh mesh;
   mesh.points = skin.points;
   mesh.triangles = skin.triangles;
   return mesh;
 }
 
-MeshReport expect_sound(const Skin& before, const Skin& after) {
+mesh::MeshReport expect_sound(const model::Skin& before, const model::Skin& after) {
   const TriangleMesh was = mesh_of(before), is = mesh_of(after);
   const double volume = signed_volume(was);
   EXPECT_NEAR(signed_volume(is), volume, 1e-12 * volume);
-  const MeshReport report = examine_mesh(is);
+  const mesh::MeshReport report = mesh::examine_mesh(is);
   EXPECT_TRUE(report.closed());
   EXPECT_TRUE(report.oriented());
   EXPECT_TRUE(report.manifold());
@@ -64,21 +64,21 @@ MeshReport expect_sound(const Skin& before, const Skin& after) {
   return report;
 }
 
-TriangleMesh walls_of(const SkinCut& cut) {
+TriangleMesh walls_of(const cutting::SkinCut& cut) {
   TriangleMesh walls = mesh_of(cut.skin);
   walls.triangles.clear();
   for (std::size_t t = 0; t < cut.triangle.size(); ++t)
-    if (cut.triangle[t] == SkinCut::none)
+    if (cut.triangle[t] == cutting::SkinCut::none)
       walls.triangles.push_back(cut.skin.triangles[t]);
   return walls;
 }
 
-double area_of_walls(const SkinCut& cut) {
+double area_of_walls(const cutting::SkinCut& cut) {
   return surface_area(walls_of(cut));
 }
 
-SkinCut checked(const Skin& skin, const SkinSheet& sheet) {
-  SkinCut cut = cut_skin(skin, sheet, cell, reach);
+cutting::SkinCut checked(const model::Skin& skin, const cutting::SkinSheet& sheet) {
+  cutting::SkinCut cut = cutting::cut_skin(skin, sheet, cell, reach);
   (void)expect_sound(skin, cut.skin);
   EXPECT_NEAR(surface_area(mesh_of(cut.skin)) - area_of_walls(cut), surface_area(mesh_of(skin)),
               1e-6);
@@ -100,10 +100,10 @@ std::vector<std::vector<Vec3>> rows_down(double x, double high, double low, int 
 TEST(CutSkin, APlanePartsItInTwoClosedPieces) {
   for (const Vec3& normal : {Vec3{1, 0, 0}, Vec3{0.3, -1, 0.7}, Vec3{0, 0, 1}})
     for (const double off : {0.0, 0.3}) { // 0: through points and edges
-      const Skin skin = ball_skin();
-      const SkinCut cut =
-          checked(skin, plane_sheet(skin, {off * normal / norm(normal), normal}, cell));
-      EXPECT_EQ(examine_mesh(mesh_of(cut.skin)).components, 2U);
+      const model::Skin skin = ball_skin();
+      const cutting::SkinCut cut =
+          checked(skin, cutting::plane_sheet(skin, {off * normal / norm(normal), normal}, cell));
+      EXPECT_EQ(mesh::examine_mesh(mesh_of(cut.skin)).components, 2U);
       EXPECT_NEAR(area_of_walls(cut), 2 * std::numbers::pi * (1 - off * off), 0.03);
       std::size_t above = 0, below = 0;
       for (std::size_t p = 0; p < cut.skin.points.size(); ++p) {
@@ -131,12 +131,13 @@ TEST(CutSkin, APlanePartsItInTwoClosedPieces) {
 }
 
 TEST(CutSkin, TextureCoordinatesStayWhereTheyAre) {
-  const Skin skin = ball_skin();
-  const SkinCut cut = checked(skin, plane_sheet(skin, {{0.11, 0, 0}, {1, 0.2, 0.4}}, cell));
+  const model::Skin skin = ball_skin();
+  const cutting::SkinCut cut =
+      checked(skin, cutting::plane_sheet(skin, {{0.11, 0, 0}, {1, 0.2, 0.4}}, cell));
   for (std::size_t t = 0; t < cut.skin.triangles.size(); ++t)
     for (std::size_t k = 0; k < 3; ++k) {
       const Vec3& p = cut.skin.points[cut.skin.triangles[t][k]];
-      if (cut.triangle[t] == SkinCut::none)
+      if (cut.triangle[t] == cutting::SkinCut::none)
         continue;
       EXPECT_NEAR(cut.skin.texcoords[t][2 * k], p.x - 2 * p.z, 1e-9);
       EXPECT_NEAR(cut.skin.texcoords[t][2 * k + 1], p.y + p.z, 1e-9);
@@ -145,9 +146,10 @@ TEST(CutSkin, TextureCoordinatesStayWhereTheyAre) {
 
 TEST(CutSkin, AWoundThatEndsInsideLeavesItOnePiece) {
   for (const double half : {1.5, 0.4}) {
-    const Skin skin = ball_skin();
-    const SkinCut cut = checked(skin, strip_sheet(rows_down(0.123, 1.5, 0.1, 7, half, 0.01)));
-    const MeshReport report = examine_mesh(mesh_of(cut.skin));
+    const model::Skin skin = ball_skin();
+    const cutting::SkinCut cut =
+        checked(skin, cutting::strip_sheet(rows_down(0.123, 1.5, 0.1, 7, half, 0.01)));
+    const mesh::MeshReport report = mesh::examine_mesh(mesh_of(cut.skin));
     EXPECT_EQ(report.components, 1U);
     EXPECT_GT(walls_of(cut).triangles.size(), 50U);
     std::size_t fronts = 0;
@@ -158,51 +160,52 @@ TEST(CutSkin, AWoundThatEndsInsideLeavesItOnePiece) {
 }
 
 TEST(CutSkin, GoesOnWhereItEnded) {
-  const Skin skin = ball_skin();
+  const model::Skin skin = ball_skin();
   const std::vector<std::vector<Vec3>> rows = rows_down(0.123, 1.5, -1.5, 24, 1.5, 0.013);
-  const Skin at_once = checked(skin, strip_sheet(rows)).skin;
+  const model::Skin at_once = checked(skin, cutting::strip_sheet(rows)).skin;
   for (const std::size_t each : {1U, 3U, 8U}) {
-    Skin now = skin;
+    model::Skin now = skin;
     std::vector<Vec3> start = rows[0];
     for (std::size_t n = 0; n + each < rows.size(); n += each) {
       std::vector<std::vector<Vec3>> step{start};
       for (std::size_t k = 1; k <= each; ++k)
         step.push_back(rows[n + k]);
-      SkinCut cut = checked(now, strip_sheet(step));
+      cutting::SkinCut cut = checked(now, cutting::strip_sheet(step));
       now = std::move(cut.skin);
       start = std::move(cut.end);
     }
-    const MeshReport report = examine_mesh(mesh_of(now));
+    const mesh::MeshReport report = mesh::examine_mesh(mesh_of(now));
     EXPECT_EQ(report.components, 2U) << each;
     EXPECT_NEAR(surface_area(mesh_of(now)), surface_area(mesh_of(at_once)), 1e-9);
   }
 }
 
 TEST(CutSkin, ABladeThatSawsGoesOnToo) {
-  Skin now = ball_skin();
+  model::Skin now = ball_skin();
   std::vector<Vec3> start = rows_down(0.1, 1.5, 1.5, 1)[0];
   double z = 1.5;
   for (int n = 0; n < 30; ++n) {
     const double to = z + (n % 3 == 2 ? 0.15 : -0.2);
     std::vector<std::vector<Vec3>> rows{start, rows_down(0.1, to, to, 1)[0]};
-    SkinCut cut = checked(now, strip_sheet(rows));
+    cutting::SkinCut cut = checked(now, cutting::strip_sheet(rows));
     now = std::move(cut.skin);
     start = std::move(cut.end);
     z = to;
   }
-  EXPECT_EQ(examine_mesh(mesh_of(now)).components, 2U);
+  EXPECT_EQ(mesh::examine_mesh(mesh_of(now)).components, 2U);
 }
 
 TEST(CutSkin, CutsOfCutsAreClosedToo) {
-  const Skin skin = ball_skin();
-  Skin now = skin;
+  const model::Skin skin = ball_skin();
+  model::Skin now = skin;
   std::size_t pieces = 1;
-  const std::vector<CutPlane> planes{
+  const std::vector<cutting::CutPlane> planes{
       {{0.1, 0, 0}, {1, 0, 0}}, {{0, 0.05, 0}, {0.2, 1, 0}}, {{0, 0, 0.12}, {0.1, 0.1, 1}}};
-  for (const CutPlane& plane : planes) {
-    SkinCut cut = cut_skin(now, plane_sheet(now, plane, cell), cell, reach);
+  for (const cutting::CutPlane& plane : planes) {
+    cutting::SkinCut cut =
+        cutting::cut_skin(now, cutting::plane_sheet(now, plane, cell), cell, reach);
     const TriangleMesh is = mesh_of(cut.skin);
-    const MeshReport report = examine_mesh(is);
+    const mesh::MeshReport report = mesh::examine_mesh(is);
     EXPECT_TRUE(report.closed() && report.oriented() && report.manifold());
     pieces *= 2;
     EXPECT_EQ(report.components, pieces);
@@ -218,48 +221,51 @@ TEST(CutSkin, ASurfaceInsideIsCutByItself) {
   both.points.insert(both.points.end(), inner.points.begin(), inner.points.end());
   for (const Triangle& t : inner.triangles)
     both.triangles.push_back({t[0] + first, t[1] + first, t[2] + first});
-  Skin skin = skin_of(both);
+  model::Skin skin = skin_of(both);
   std::fill(skin.material.end() - static_cast<std::ptrdiff_t>(inner.triangles.size()),
             skin.material.end(), 3);
-  const SkinCut whole = checked(skin, plane_sheet(skin, {{0.15, 0, 0}, {1, 0.1, 0}}, cell));
-  EXPECT_EQ(examine_mesh(mesh_of(whole.skin)).components, 4U);
+  const cutting::SkinCut whole =
+      checked(skin, cutting::plane_sheet(skin, {{0.15, 0, 0}, {1, 0.1, 0}}, cell));
+  EXPECT_EQ(mesh::examine_mesh(mesh_of(whole.skin)).components, 4U);
   // Of the walls: what is in the inner one, of both shells, and what is round it; 0 of the skin.
   EXPECT_EQ(std::set<std::uint32_t>(whole.region.begin(), whole.region.end()).size(), 4U);
   // All that lies in the inner one has its material, of either shell.
   for (std::size_t t = 0; t < whole.triangle.size(); ++t) {
-    if (whole.triangle[t] != SkinCut::none)
+    if (whole.triangle[t] != cutting::SkinCut::none)
       continue;
     Vec3 middle;
     for (const std::uint32_t p : whole.skin.triangles[t])
       middle += whole.skin.points[p] / 3;
     EXPECT_EQ(whole.material[whole.region[t]], norm(middle - Vec3{0.1, 0.2, 0}) < 0.4 ? 3 : -1);
   }
-  Skin now = skin;
+  model::Skin now = skin;
   std::vector<Vec3> start = rows_down(0.123, 1.5, 1.5, 1)[0];
   for (const double z : {0.7, 0.3, 0.0, -0.3, -1.5}) {
     const std::vector<std::vector<Vec3>> rows{start, rows_down(0.123, z, z, 1)[0]};
-    SkinCut cut = checked(now, strip_sheet(rows));
+    cutting::SkinCut cut = checked(now, cutting::strip_sheet(rows));
     now = std::move(cut.skin);
     start = std::move(cut.end);
   }
-  EXPECT_EQ(examine_mesh(mesh_of(now)).components, 4U);
+  EXPECT_EQ(mesh::examine_mesh(mesh_of(now)).components, 4U);
 }
 
 TEST(CutSkin, ASheetBesideItChangesNothing) {
-  const Skin skin = ball_skin();
-  const SkinCut cut = cut_skin(skin, plane_sheet(skin, {{3, 0, 0}, {1, 0, 0}}, cell), cell, reach);
+  const model::Skin skin = ball_skin();
+  const cutting::SkinCut cut = cutting::cut_skin(
+      skin, cutting::plane_sheet(skin, {{3, 0, 0}, {1, 0, 0}}, cell), cell, reach);
   EXPECT_EQ(cut.skin, skin);
   EXPECT_TRUE(walls_of(cut).triangles.empty());
 }
 
 TEST(CutSkin, WhatIsOpenIsRefused) {
-  Skin skin = ball_skin();
+  model::Skin skin = ball_skin();
   skin.triangles.erase(skin.triangles.begin() + 5, skin.triangles.begin() + 900);
   skin.material.resize(skin.triangles.size());
   skin.texcoords.resize(skin.triangles.size());
-  EXPECT_THROW(cut_skin(skin, plane_sheet(skin, {{0, 0, 0.01}, {0, 0, 1}}, cell), cell, reach),
+  EXPECT_THROW(cutting::cut_skin(skin, cutting::plane_sheet(skin, {{0, 0, 0.01}, {0, 0, 1}}, cell),
+                                 cell, reach),
                Error);
 }
 
 } // namespace
-} // namespace gewebe
+} // namespace gewebe::test

@@ -18,31 +18,31 @@
 #include <string>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::test {
 namespace {
 
 using test::blade_strip;
 
 /// A box of 6 × 4 × 4 cells, 3 × 2 × 2 mm, of two materials, held at x = 0, with texture
 /// coordinates that are linear in space on each side of a seam, and loads of lead at two nodes.
-Model box_model(bool quadratic) {
-  TetMesh mesh = test::box_tetrahedra(6, 4, 4, 0.5);
+model::Model box_model(bool quadratic) {
+  tetrahedra::TetMesh mesh = test::box_tetrahedra(6, 4, 4, 0.5);
   for (const Tetrahedron& t : mesh.tetrahedra) {
     double x = 0;
     for (const std::uint32_t corner : t)
       x += mesh.points[corner].x / 4;
     mesh.material.push_back(x < 1.5 ? 0 : 1);
   }
-  SolidModelOptions options;
+  fem::SolidModelOptions options;
   options.material.materials = {{"gel", 1.1e-3, 5000, 1, 0.2, 0.4},
                                 {"stone", 2e-3, 20000, 1, 0.2, 0.2}};
   options.material.of_part = {0, 1};
   options.quadratic = quadratic;
   options.normals = true;
-  Model model = solid_model(std::move(mesh), options, {});
-  for (Node& node : model.nodes)
+  model::Model model = fem::solid_model(std::move(mesh), options, {});
+  for (model::Node& node : model.nodes)
     if (node.position.x == 0)
-      node.fixed = fixed_all;
+      node.fixed = model::fixed_all;
   model.nodes[5].mass += 0.5;
   model.nodes[20].mass += 0.25;
   std::rotate(model.triangles[3].begin(), model.triangles[3].begin() + 1, model.triangles[3].end());
@@ -53,7 +53,7 @@ std::array<double, 2> texture_at(const Vec3& p, bool seam) {
   return {p.x - 2 * p.z + (seam ? 10 : 0), p.y + p.z};
 }
 
-void add_texcoords(Model& model) {
+void add_texcoords(model::Model& model) {
   for (std::size_t t = 0; t < model.triangles.size(); ++t) {
     std::array<double, 6> coordinates{};
     for (std::size_t c = 0; c < 3; ++c) {
@@ -70,18 +70,19 @@ TriangleMesh half_way() {
   return blade_strip({1.2, 1, 1.6}, {0.05, 2, 0}, {0.02, 0, 0.75}, 3);
 }
 
-SolidCut checked_cut(const Model& model, const TriangleMesh& blade) {
-  SolidCut cut = cut_solid(model, blade);
-  check_model(cut.model);
+cutting::SolidCut checked_cut(const model::Model& model, const TriangleMesh& blade) {
+  cutting::SolidCut cut = cutting::cut_solid(model, blade);
+  model::check_model(cut.model);
   EXPECT_EQ(cut.origin.size(), cut.model.nodes.size());
   EXPECT_EQ(cut.tetrahedron.size(), cut.model.tetrahedra.size());
   EXPECT_EQ(cut.triangle.size(), cut.model.triangles.size());
-  EXPECT_NEAR(total_mass(cut.model), total_mass(model), 1e-13 * total_mass(model));
-  for (const Node& node : cut.model.nodes)
+  EXPECT_NEAR(model::total_mass(cut.model), model::total_mass(model),
+              1e-13 * model::total_mass(model));
+  for (const model::Node& node : cut.model.nodes)
     EXPECT_GT(node.mass, 0);
-  const TriangleMesh surface = surface_mesh(cut.model);
+  const TriangleMesh surface = model::surface_mesh(cut.model);
   EXPECT_NEAR(signed_volume(surface), 12, 1e-11);
-  const MeshReport report = examine_mesh(surface);
+  const mesh::MeshReport report = mesh::examine_mesh(surface);
   EXPECT_TRUE(report.closed() && report.oriented() && report.manifold());
   return cut;
 }
@@ -90,60 +91,63 @@ class CutSolid : public testing::TestWithParam<bool> {};
 INSTANTIATE_TEST_SUITE_P(Orders, CutSolid, testing::Bool());
 
 TEST_P(CutSolid, IsWholeAndAsHeavyAsBefore) {
-  const Model model = box_model(GetParam());
-  const SolidCut cut = checked_cut(model, half_way());
+  const model::Model model = box_model(GetParam());
+  const cutting::SolidCut cut = checked_cut(model, half_way());
   EXPECT_TRUE(cut.cut());
   EXPECT_GT(cut.report.doubled, 3U);
   // What else two nodes carry stays with them.
   EXPECT_GT(cut.model.nodes[5].mass, 0.5);
   EXPECT_GT(cut.model.nodes[20].mass, 0.25);
   // The surface is that of the elements.
-  const TetBoundary outer = boundary(element_mesh(cut.model));
+  const tetrahedra::TetBoundary outer = tetrahedra::boundary(fem::element_mesh(cut.model));
   EXPECT_EQ(cut.model.triangles.size(), outer.mesh.triangles.size() * (GetParam() ? 4 : 1));
   double most = 0;
-  for (const Node& node : cut.model.nodes)
+  for (const model::Node& node : cut.model.nodes)
     most = test::larger(most, node.drag / node.mass);
   EXPECT_NEAR(most, 1, 1e-12);
   for (std::size_t n = 0; n < model.nodes.size(); ++n)
-    EXPECT_EQ(cut.model.nodes[n].fixed, model.nodes[n].position.x == 0 ? fixed_all : fixed_none);
+    EXPECT_EQ(cut.model.nodes[n].fixed,
+              model.nodes[n].position.x == 0 ? model::fixed_all : model::fixed_none);
   for (std::size_t n = model.nodes.size(); n < cut.model.nodes.size(); ++n)
-    EXPECT_EQ(cut.model.nodes[n].fixed, fixed_none);
+    EXPECT_EQ(cut.model.nodes[n].fixed, model::fixed_none);
 }
 
 TEST_P(CutSolid, HoldsWhatStandsBetweenHeldNodes) {
-  const Model model = box_model(GetParam());
-  const SolidCut cut = checked_cut(model, blade_strip({1, 1.1, 1}, {3, 0.1, 0}, {0, 0.1, 3}));
+  const model::Model model = box_model(GetParam());
+  const cutting::SolidCut cut =
+      checked_cut(model, blade_strip({1, 1.1, 1}, {3, 0.1, 0}, {0, 0.1, 3}));
   std::size_t fresh = 0;
   for (std::size_t n = 0; n < cut.model.nodes.size(); ++n) {
-    EXPECT_EQ(cut.model.nodes[n].fixed, cut.model.nodes[n].position.x == 0 ? fixed_all : fixed_none)
+    EXPECT_EQ(cut.model.nodes[n].fixed,
+              cut.model.nodes[n].position.x == 0 ? model::fixed_all : model::fixed_none)
         << n;
     fresh += n >= model.nodes.size() && cut.model.nodes[n].position.x == 0 ? 1 : 0;
   }
   EXPECT_GT(fresh, 3U);
   for (std::size_t n = 0; n < model.nodes.size(); ++n)
-    if (model.nodes[n].fixed != fixed_none && cut.origin[n].node == n) {
+    if (model.nodes[n].fixed != model::fixed_none && cut.origin[n].node == n) {
       EXPECT_EQ(cut.model.nodes[n].position, model.nodes[n].position);
     }
 }
 
 /// Drag per mass of a node is the mean of the nodes that it stands between.
 TEST_P(CutSolid, DragOfNewNodesIsTheMeanOfTheirParents) {
-  Model model = box_model(GetParam());
+  model::Model model = box_model(GetParam());
   for (std::size_t n = 0; n < model.nodes.size(); ++n)
     model.nodes[n].drag = model.nodes[n].mass * static_cast<double>(1 + n % 7);
-  const SolidCut cut = checked_cut(model, half_way());
+  const cutting::SolidCut cut = checked_cut(model, half_way());
   std::size_t several = 0;
   for (std::size_t n = 0; n < cut.model.nodes.size(); ++n) {
-    const TetNodeOrigin& from = cut.origin[n];
-    const Node& node = cut.model.nodes[n];
+    const incision::TetNodeOrigin& from = cut.origin[n];
+    const model::Node& node = cut.model.nodes[n];
     double rate = 0;
     int parents = 0;
-    for (std::size_t k = 0; from.node == TetNodeOrigin::none && k < 4; ++k)
+    for (std::size_t k = 0; from.node == incision::TetNodeOrigin::none && k < 4; ++k)
       if (from.weights[k] != 0) {
         rate += static_cast<double>(1 + model.tetrahedra[from.tetrahedron][k] % 7);
         ++parents;
       }
-    if (from.node != TetNodeOrigin::none)
+    if (from.node != incision::TetNodeOrigin::none)
       rate = static_cast<double>(1 + from.node % 7);
     EXPECT_NEAR(node.drag / node.mass, rate / std::max(parents, 1), 1e-9) << n;
     several += parents > 1 ? 1 : 0;
@@ -151,21 +155,21 @@ TEST_P(CutSolid, DragOfNewNodesIsTheMeanOfTheirParents) {
   EXPECT_GT(several, 3U);
 }
 
-Vec3 centre(const Model& model, std::size_t triangle) {
+Vec3 centre(const model::Model& model, std::size_t triangle) {
   Vec3 sum;
   for (const std::uint32_t corner : model.triangles[triangle])
     sum += model.nodes[corner].position / 3;
   return sum;
 }
 
-bool has_moved(const SolidCut& cut, std::size_t triangle, std::size_t before) {
+bool has_moved(const cutting::SolidCut& cut, std::size_t triangle, std::size_t before) {
   return std::ranges::any_of(cut.model.triangles[triangle], [&](std::uint32_t n) {
-    return n < before && cut.origin[n].node == TetNodeOrigin::none;
+    return n < before && cut.origin[n].node == incision::TetNodeOrigin::none;
   });
 }
 
 /// Is a place in its plane within a triangle?
-bool holds(const Model& model, std::size_t triangle, const Vec3& place) {
+bool holds(const model::Model& model, std::size_t triangle, const Vec3& place) {
   const Triangle& t = model.triangles[triangle];
   const Vec3 &a = model.nodes[t[0]].position, &b = model.nodes[t[1]].position,
              &c = model.nodes[t[2]].position;
@@ -176,17 +180,17 @@ bool holds(const Model& model, std::size_t triangle, const Vec3& place) {
 }
 
 TEST_P(CutSolid, PartsOfTrianglesKeepTheirTexture) {
-  Model model = box_model(GetParam());
+  model::Model model = box_model(GetParam());
   for (std::size_t t = 0; t < model.triangles.size(); ++t) // any corner may come first
     std::rotate(model.triangles[t].begin(),
                 model.triangles[t].begin() + static_cast<std::ptrdiff_t>(t % 3),
                 model.triangles[t].end());
   add_texcoords(model);
-  const SolidCut cut = checked_cut(model, half_way());
+  const cutting::SolidCut cut = checked_cut(model, half_way());
   std::size_t walls = 0, parts = 0;
   ASSERT_EQ(cut.model.texcoords.size(), cut.model.triangles.size());
   for (std::size_t t = 0; t < cut.model.triangles.size(); ++t) {
-    if (cut.triangle[t] == SolidCut::wall) {
+    if (cut.triangle[t] == cutting::SolidCut::wall) {
       ++walls;
       EXPECT_EQ(cut.model.texcoords[t], (std::array<double, 6>{}));
       continue;
@@ -208,8 +212,8 @@ TEST_P(CutSolid, PartsOfTrianglesKeepTheirTexture) {
 }
 
 TEST_P(CutSolid, NormalsLookOutOfBothWalls) {
-  const Model model = box_model(GetParam());
-  const SolidCut cut = checked_cut(model, half_way());
+  const model::Model model = box_model(GetParam());
+  const cutting::SolidCut cut = checked_cut(model, half_way());
   ASSERT_EQ(cut.model.normals.size(), cut.model.nodes.size());
   std::vector<Vec3> sums(cut.model.nodes.size());
   for (const auto& [a, b, c] : cut.model.triangles) {
@@ -225,20 +229,20 @@ TEST_P(CutSolid, NormalsLookOutOfBothWalls) {
 }
 
 TEST_P(CutSolid, HeldNodesStayAndNewOnesHaveAMaterial) {
-  Model model = box_model(GetParam());
+  model::Model model = box_model(GetParam());
   const TriangleMesh blade = blade_strip({1.4, 1, 1.6}, {0.05, 2, 0}, {0.6, 0, 0.75}, 3);
-  const auto moved = [&](const SolidCut& cut, std::size_t n) {
+  const auto moved = [&](const cutting::SolidCut& cut, std::size_t n) {
     return cut.model.nodes[n].position != model.nodes[n].position;
   };
-  const SolidCut free = checked_cut(model, blade);
+  const cutting::SolidCut free = checked_cut(model, blade);
   std::vector<std::size_t> held;
   for (std::size_t n = 0; n < model.nodes.size(); ++n)
     if (moved(free, n))
       held.push_back(n);
   ASSERT_GT(held.size(), 0U);
   for (const std::size_t n : held)
-    model.nodes[n].fixed = fixed_y;
-  const SolidCut cut = checked_cut(model, blade);
+    model.nodes[n].fixed = model::fixed_y;
+  const cutting::SolidCut cut = checked_cut(model, blade);
   std::size_t corners = 0;
   for (const std::size_t n : held) {
     const bool is_corner = std::ranges::any_of(
@@ -264,11 +268,11 @@ TEST_P(CutSolid, HeldNodesStayAndNewOnesHaveAMaterial) {
 }
 
 /// How far the free end sinks under its weight.
-double droop(const Model& model) {
-  const StiffnessMatrix matrix = stiffness_matrix(model);
-  const std::vector<double> f = weight_of(model, {0, 0, -9810});
+double droop(const model::Model& model) {
+  const linalg::StiffnessMatrix matrix = fem::stiffness_matrix(model);
+  const std::vector<double> f = fem::weight_of(model, {0, 0, -9810});
   std::vector<double> u(f.size());
-  solve_axes(matrix, Factor(matrix, {}), f, u);
+  linalg::solve_axes(matrix, linalg::Factor(matrix, {}), f, u);
   double lowest = 0;
   for (const double x : u)
     lowest = test::smaller(lowest, x);
@@ -276,28 +280,28 @@ double droop(const Model& model) {
 }
 
 TEST_P(CutSolid, BendsMoreThanBefore) {
-  const Model model = box_model(GetParam());
+  const model::Model model = box_model(GetParam());
   const double before = droop(model);
   // Cutting into the side changes little more than the mesh; from above half way it is a hinge.
   const double slit =
-      droop(cut_solid(model, blade_strip({1.2, 1, 1}, {0.5, 0, 0}, {0, 0.6, 0.05})).model);
-  const double hinge = droop(cut_solid(model, half_way()).model);
+      droop(cutting::cut_solid(model, blade_strip({1.2, 1, 1}, {0.5, 0, 0}, {0, 0.6, 0.05})).model);
+  const double hinge = droop(cutting::cut_solid(model, half_way()).model);
   EXPECT_LT(before, 0);
   EXPECT_LT(hinge, 1.3 * before);
   EXPECT_LT(hinge, 1.15 * slit);
 }
 
 TEST_P(CutSolid, RefusesByName) {
-  const Model model = box_model(GetParam());
-  const auto refusal = [](const Model& of) {
-    return test::complaint([&] { cut_solid(of, half_way()); });
+  const model::Model model = box_model(GetParam());
+  const auto refusal = [](const model::Model& of) {
+    return test::complaint([&] { cutting::cut_solid(of, half_way()); });
   };
   EXPECT_EQ(refusal(model), "");
-  Model other = model;
+  model::Model other = model;
   other.tetrahedra.clear();
   EXPECT_NE(refusal(other).find("no tetrahedra"), std::string::npos);
   other = model;
-  other.springs.push_back({0, 1, SpringKind::edge, 1, 0, 1});
+  other.springs.push_back({0, 1, model::SpringKind::edge, 1, 0, 1});
   EXPECT_NE(refusal(other).find("1 springs"), std::string::npos);
   other = model;
   other.nodes[0].central = static_cast<std::int32_t>(other.nodes.size());
@@ -311,13 +315,14 @@ TEST_P(CutSolid, RefusesByName) {
 }
 
 TEST_P(CutSolid, ABladeBesideItChangesNothing) {
-  Model model = box_model(GetParam());
+  model::Model model = box_model(GetParam());
   add_texcoords(model);
-  const SolidCut cut = cut_solid(model, blade_strip({5, 5, 5}, {1, 0, 0}, {0, 1, 0}));
+  const cutting::SolidCut cut =
+      cutting::cut_solid(model, blade_strip({5, 5, 5}, {1, 0, 0}, {0, 1, 0}));
   EXPECT_EQ(cut.model, model);
   EXPECT_FALSE(cut.cut());
   EXPECT_EQ(cut.triangle.size(), model.triangles.size());
 }
 
 } // namespace
-} // namespace gewebe
+} // namespace gewebe::test

@@ -22,18 +22,19 @@ using namespace gewebe::test;
 
 namespace {
 
-std::shared_ptr<const Model> round_organ(int rounds) {
-  return std::make_shared<const Model>(model_of(sphere_mesh(rounds, 20, {1, 2, 3})));
+std::shared_ptr<const model::Model> round_organ(int rounds) {
+  return std::make_shared<const model::Model>(model_of(sphere_mesh(rounds, 20, {1, 2, 3})));
 }
 
 /// One that opens the surface.
-CutModel opened(const Model& model, double length) {
-  const SweptQuad area = blade_at(model, 100, 0.3, length * mean_edge(model), mean_edge(model));
-  return cut_model(model, swept_cut(model, {}, std::span(&area, 1)));
+cutting::CutModel opened(const model::Model& model, double length) {
+  const cutting::SweptQuad area =
+      blade_at(model, 100, 0.3, length * mean_edge(model), mean_edge(model));
+  return cutting::cut_model(model, cutting::swept_cut(model, {}, std::span(&area, 1)));
 }
 
-std::vector<double> fresh(const Model& model, std::vector<double> f) {
-  const AxisSolver solver = factorise_axes(model, Context{});
+std::vector<double> fresh(const model::Model& model, std::vector<double> f) {
+  const compliance::AxisSolver solver = compliance::factorise_axes(model, Context{});
   solver.solve(f, f.size() / (3 * model.nodes.size()));
   return f;
 }
@@ -41,14 +42,15 @@ std::vector<double> fresh(const Model& model, std::vector<double> f) {
 } // namespace
 
 TEST(CutStiffness, EveryWayIsThatOfAFreshFactor) {
-  for (const CutWay way : {CutWay::woodbury, CutWay::refactor, CutWay::fresh}) {
+  for (const update::CutWay way :
+       {update::CutWay::woodbury, update::CutWay::refactor, update::CutWay::fresh}) {
     const auto model = round_organ(4);
-    CutStiffness stiffness(model, nullptr, Context{});
+    update::CutStiffness stiffness(model, nullptr, Context{});
     stiffness.prepare();
-    CutModel cut = opened(*model, 5);
+    cutting::CutModel cut = opened(*model, 5);
     ASSERT_GT(cut.doubled, 0u);
-    const auto now = std::make_shared<const Model>(std::move(cut.model));
-    const CutWork work = stiffness.cut(now, cut.origin, cut.place, way);
+    const auto now = std::make_shared<const model::Model>(std::move(cut.model));
+    const update::CutWork work = stiffness.cut(now, cut.origin, cut.place, way);
     EXPECT_EQ(work.way, way);
     const std::vector<double> f = random_vector(3 * now->nodes.size(), 1);
     std::vector<double> u = f;
@@ -59,27 +61,27 @@ TEST(CutStiffness, EveryWayIsThatOfAFreshFactor) {
 
 TEST(CutStiffness, ManyCutsInARow) {
   auto model = round_organ(3);
-  CutStiffness stiffness(model, nullptr, Context{});
+  update::CutStiffness stiffness(model, nullptr, Context{});
   std::mt19937 random(3);
   int corrected = 0, refactored = 0;
   for (int done = 0; done < 25;) {
-    std::optional<CutModel> next = random_cut(*model, random, 6);
+    std::optional<cutting::CutModel> next = random_cut(*model, random, 6);
     if (!next)
       continue;
-    auto now = std::make_shared<const Model>(std::move(next->model));
+    auto now = std::make_shared<const model::Model>(std::move(next->model));
     const std::vector<double> f = random_vector(3 * now->nodes.size(), 2);
     std::vector<double> expected;
     try {
       expected = fresh(*now, f);
-    } catch (const SingularStiffness&) {
+    } catch (const linalg::SingularStiffness&) {
       continue;
     }
     // On so few nodes a refactorisation is always cheaper.
-    const CutWork work =
+    const update::CutWork work =
         stiffness.cut(now, next->origin, next->place,
-                      done % 3 == 0 ? std::optional(CutWay::woodbury) : std::nullopt);
-    corrected += work.way == CutWay::woodbury ? 1 : 0;
-    refactored += work.way == CutWay::refactor ? 1 : 0;
+                      done % 3 == 0 ? std::optional(update::CutWay::woodbury) : std::nullopt);
+    corrected += work.way == update::CutWay::woodbury ? 1 : 0;
+    refactored += work.way == update::CutWay::refactor ? 1 : 0;
     std::vector<double> u = f;
     stiffness.compliance()->solve(u, 1);
     ASSERT_LT(relative_difference(u, expected), 1e-8) << done;
@@ -92,16 +94,17 @@ TEST(CutStiffness, ManyCutsInARow) {
 
 TEST(CutStiffness, ColumnsOfTheFirstModelServeTheCutOne) {
   const auto model = round_organ(4);
-  const StiffnessMatrix matrix = stiffness_matrix(*model);
-  const FactorData factor = Factor(matrix, {}).data();
-  CutStiffness stiffness(
-      model, compliance_of_store(timing::memory_stiffness(matrix, factor, {3, 500, 1000}, false)),
-      Context{});
-  CutModel cut = opened(*model, 4);
-  const auto now = std::make_shared<const Model>(std::move(cut.model));
+  const linalg::StiffnessMatrix matrix = fem::stiffness_matrix(*model);
+  const linalg::FactorData factor = linalg::Factor(matrix, {}).data();
+  update::CutStiffness stiffness(model,
+                                 compliance::compliance_of_store(timing::memory_stiffness(
+                                     matrix, factor, {3, 500, 1000}, false)),
+                                 Context{});
+  cutting::CutModel cut = opened(*model, 4);
+  const auto now = std::make_shared<const model::Model>(std::move(cut.model));
   (void)stiffness.cut(now, cut.origin, cut.place);
-  const std::shared_ptr<ComplianceSource> compliance = stiffness.compliance();
-  const ColumnSource* const stored = compliance->columns();
+  const std::shared_ptr<compliance::ComplianceSource> compliance = stiffness.compliance();
+  const columns::ColumnSource* const stored = compliance->columns();
   ASSERT_NE(stored, nullptr);
   EXPECT_FALSE(stored->pays(1)) << "one node is solved for";
   for (std::size_t k = 0; k < stored->nodes().size(); ++k) {
@@ -117,8 +120,8 @@ TEST(CutStiffness, ColumnsOfTheFirstModelServeTheCutOne) {
 TEST(CutStiffness, NamesWhatMovesFreely) {
   // A node that hangs at one spring, with its tension: nothing holds it across.
   const auto model = round_organ(3);
-  CutStiffness stiffness(model, nullptr, Context{});
-  Cut cut;
+  update::CutStiffness stiffness(model, nullptr, Context{});
+  cutting::Cut cut;
   bool one = true;
   for (std::size_t e = 0; e < model->springs.size(); ++e)
     if (model->springs[e].i == 40 || model->springs[e].j == 40) {
@@ -126,12 +129,12 @@ TEST(CutStiffness, NamesWhatMovesFreely) {
         cut.springs.push_back(e);
       one = false;
     }
-  CutModel next = cut_model(*model, cut);
-  const auto now = std::make_shared<const Model>(std::move(next.model));
+  cutting::CutModel next = cutting::cut_model(*model, cut);
+  const auto now = std::make_shared<const model::Model>(std::move(next.model));
   try {
     (void)stiffness.cut(now, next.origin, next.place);
     FAIL() << "node 40 can move";
-  } catch (const SingularStiffness& error) {
+  } catch (const linalg::SingularStiffness& error) {
     EXPECT_NE(std::string(error.what()).find("40"), std::string::npos) << error.what();
   }
 }
@@ -139,25 +142,25 @@ TEST(CutStiffness, NamesWhatMovesFreely) {
 TEST(CutStiffness, WhatWasHandedOutBeforeGivesTheSameBits) {
   const auto model = round_organ(3);
   for (const int cuts : {1, 2}) {
-    CutStiffness stiffness(model, nullptr, Context{});
+    update::CutStiffness stiffness(model, nullptr, Context{});
     stiffness.prepare();
-    std::shared_ptr<const Model> now = model;
+    std::shared_ptr<const model::Model> now = model;
     if (cuts == 2) { // before the one that changes the factor
-      CutModel cut = opened(*now, 2);
-      now = std::make_shared<const Model>(std::move(cut.model));
-      (void)stiffness.cut(now, cut.origin, cut.place, CutWay::refactor);
+      cutting::CutModel cut = opened(*now, 2);
+      now = std::make_shared<const model::Model>(std::move(cut.model));
+      (void)stiffness.cut(now, cut.origin, cut.place, update::CutWay::refactor);
     }
-    const CutStiffness copy = stiffness;
-    const std::shared_ptr<ComplianceSource> before = copy.compliance();
-    const auto answer = [&](ComplianceSource& source, std::size_t nodes) {
+    const update::CutStiffness copy = stiffness;
+    const std::shared_ptr<compliance::ComplianceSource> before = copy.compliance();
+    const auto answer = [&](compliance::ComplianceSource& source, std::size_t nodes) {
       std::vector<double> f(3 * nodes, 1);
       source.solve(f, 1);
       return f;
     };
     const std::vector<double> expected = answer(*before, now->nodes.size());
-    CutModel cut = opened(*now, 4);
-    const auto next = std::make_shared<const Model>(std::move(cut.model));
-    (void)stiffness.cut(next, cut.origin, cut.place, CutWay::refactor);
+    cutting::CutModel cut = opened(*now, 4);
+    const auto next = std::make_shared<const model::Model>(std::move(cut.model));
+    (void)stiffness.cut(next, cut.origin, cut.place, update::CutWay::refactor);
     const std::vector<double> behind = answer(*stiffness.compliance(), next->nodes.size());
     EXPECT_EQ(answer(*before, now->nodes.size()), expected);
     EXPECT_EQ(answer(*copy.compliance(), now->nodes.size()), expected);
@@ -171,15 +174,15 @@ TEST(CutStiffness, RepeatedIsTheSameToTheBit) {
     Context context;
     context.threads = threads;
     auto model = round_organ(3);
-    CutStiffness stiffness(model, nullptr, context);
+    update::CutStiffness stiffness(model, nullptr, context);
     if (threads == 2)
       stiffness.prepare(); // announced or not
     std::mt19937 random(5);
     for (int done = 0; done < 6;) {
-      std::optional<CutModel> next = random_cut(*model, random, 4);
+      std::optional<cutting::CutModel> next = random_cut(*model, random, 4);
       if (!next)
         continue;
-      model = std::make_shared<const Model>(std::move(next->model));
+      model = std::make_shared<const model::Model>(std::move(next->model));
       (void)stiffness.cut(model, next->origin, next->place);
       ++done;
     }

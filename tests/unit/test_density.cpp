@@ -36,9 +36,9 @@ long double reference(const Particles& particles, const Vec3& x) {
 
 /// Largest |grid − reference| over a box of centres around all supports, evaluated at centre +
 /// shift.
-double largest_error(const Grid& grid, const Particles& particles, double shift) {
-  GridAccessor accessor(grid);
-  const GridTransform& transform = grid.info().transform;
+double largest_error(const volume::Grid& grid, const Particles& particles, double shift) {
+  volume::GridAccessor accessor(grid);
+  const volume::GridTransform& transform = grid.info().transform;
   const Box3 box = support_box(particles);
   const Vec3 low = transform.to_index(box.min);
   const Vec3 high = transform.to_index(box.max);
@@ -54,18 +54,18 @@ double largest_error(const Grid& grid, const Particles& particles, double shift)
   return error;
 }
 
-DensityOptions options_for(double voxel) {
-  DensityOptions options;
-  options.info.transform = uniform_transform(voxel);
+density::DensityOptions options_for(double voxel) {
+  density::DensityOptions options;
+  options.info.transform = volume::uniform_transform(voxel);
   return options;
 }
 
-std::vector<DensityKernel> density_add_kernels() {
-  std::vector<DensityKernel> kernels{add_density_baseline};
+std::vector<density::DensityKernel> density_add_kernels() {
+  std::vector<density::DensityKernel> kernels{density::add_density_baseline};
   if (best_cpu_level() >= CpuLevel::avx2)
-    kernels.push_back(add_density_avx2);
+    kernels.push_back(density::add_density_avx2);
   if (best_cpu_level() >= CpuLevel::avx512)
-    kernels.push_back(add_density_avx512);
+    kernels.push_back(density::add_density_avx512);
   return kernels;
 }
 
@@ -73,35 +73,35 @@ std::vector<DensityKernel> density_add_kernels() {
 
 TEST(Density, EqualsTheExpandedPolynomialAtVoxelCentres) {
   const Particles particles = random_particles(12, 6, 5, {}, 1);
-  const Grid grid = metaball_density({}, particles, options_for(0.7));
+  const volume::Grid grid = density::metaball_density({}, particles, options_for(0.7));
   EXPECT_LT(largest_error(grid, particles, 0), 4e-6);
 }
 
 TEST(Density, NegativeControlHalfAVoxelAsideIsWrong) {
   const Particles particles = random_particles(12, 6, 5, {}, 1);
-  const Grid grid = metaball_density({}, particles, options_for(0.7));
+  const volume::Grid grid = density::metaball_density({}, particles, options_for(0.7));
   EXPECT_GT(largest_error(grid, particles, 0.5), 1e-2);
 }
 
 TEST(Density, IsAccurateFarFromTheOrigin) {
   const Vec3 offset{1e6, -1e6, 1e6};
   const Particles particles = random_particles(6, 2, 1, offset, 2);
-  const Grid grid = metaball_density({}, particles, options_for(0.25));
+  const volume::Grid grid = density::metaball_density({}, particles, options_for(0.25));
   EXPECT_LT(largest_error(grid, particles, 0), 4e-6);
 }
 
 TEST(Density, KeepsItsSignNearTheSupportsEdge) {
   const Particles particles{{{0.1, 0.2, 0.3}, 4.0, 1}};
-  const Grid grid = metaball_density({}, particles, options_for(0.05));
-  for (const LeafView& leaf : grid.leaves())
-    for (int n = 0; n < leaf_voxels; ++n)
+  const volume::Grid grid = density::metaball_density({}, particles, options_for(0.05));
+  for (const volume::LeafView& leaf : grid.leaves())
+    for (int n = 0; n < volume::leaf_voxels; ++n)
       ASSERT_GE(leaf.values[n], 0);
 }
 
 TEST(Density, OnlyLeavesInReachExist) {
   const Particles particles{{{0, 0, 0}, 3, 1}, {{1e5, 0, 0}, 3, 1}};
-  DensityReport report;
-  const Grid grid = metaball_density({}, particles, options_for(1), &report);
+  density::DensityReport report;
+  const volume::Grid grid = density::metaball_density({}, particles, options_for(1), &report);
   EXPECT_LE(grid.leaves().size(), 16U);
   EXPECT_EQ(report.leaves, grid.leaves().size());
   EXPECT_EQ(report.particles_out_of_reach, 0U);
@@ -115,10 +115,10 @@ TEST(Density, IntegralOfOneParticleConverges) {
   const Particles particles{{{0.05, 0.1, -0.13}, R, 1}};
   double last = HUGE_VAL;
   for (const double voxel : {1.0, 0.5, 0.25}) {
-    const Grid grid = metaball_density({}, particles, options_for(voxel));
+    const volume::Grid grid = density::metaball_density({}, particles, options_for(voxel));
     double sum = 0;
-    for (const LeafView& leaf : grid.leaves())
-      for (int n = 0; n < leaf_voxels; ++n)
+    for (const volume::LeafView& leaf : grid.leaves())
+      for (int n = 0; n < volume::leaf_voxels; ++n)
         sum += static_cast<double>(leaf.values[n]);
     const double error = std::fabs(sum * voxel * voxel * voxel / exact - 1);
     EXPECT_LT(error, 2e-3 * voxel * voxel);
@@ -129,12 +129,12 @@ TEST(Density, IntegralOfOneParticleConverges) {
 
 TEST(Density, ClipKeepsExactlyTheCentresInside) {
   const Particles particles = random_particles(5, 5, 5, {}, 3);
-  DensityOptions options = options_for(0.5);
-  const Grid whole = metaball_density({}, particles, options);
+  density::DensityOptions options = options_for(0.5);
+  const volume::Grid whole = density::metaball_density({}, particles, options);
   options.clip = Box3{{-2.2, -3.1, 0}, {1.9, 4, 5}};
-  const Grid part = metaball_density({}, particles, options);
-  GridAccessor a(whole);
-  GridAccessor b(part);
+  const volume::Grid part = density::metaball_density({}, particles, options);
+  volume::GridAccessor a(whole);
+  volume::GridAccessor b(part);
   for (int i = -30; i < 30; ++i)
     for (int j = -30; j < 30; ++j)
       for (int k = -30; k < 30; ++k) {
@@ -149,29 +149,30 @@ TEST(Density, SameBitsForAnyThreadCountAndCpuLevel) {
   const Particles particles = random_particles(300, 20, 3, {}, 4);
   Context one;
   one.threads = 1;
-  const std::uint64_t expected = metaball_density(one, particles, options_for(0.5)).digest();
+  const std::uint64_t expected =
+      density::metaball_density(one, particles, options_for(0.5)).digest();
   for (const int threads : {2, 3})
     for (const CpuLevel level : {CpuLevel::baseline, CpuLevel::avx2, CpuLevel::avx512}) {
       Context context;
       context.threads = threads;
       context.cpu = std::min(level, best_cpu_level());
-      EXPECT_EQ(metaball_density(context, particles, options_for(0.5)).digest(), expected);
+      EXPECT_EQ(density::metaball_density(context, particles, options_for(0.5)).digest(), expected);
     }
   Particles moved = particles;
   moved[7].weight = 0.999; // the digest can tell
-  EXPECT_NE(metaball_density(one, moved, options_for(0.5)).digest(), expected);
+  EXPECT_NE(density::metaball_density(one, moved, options_for(0.5)).digest(), expected);
 }
 
 TEST(Density, RotatedLatticeSamplesTheSameField) {
   const Particles particles = random_particles(8, 5, 4, {}, 5);
-  DensityOptions options;
+  density::DensityOptions options;
   const double c = std::cos(0.4) * 0.6;
   const double s = std::sin(0.4) * 0.6;
   options.info.transform.m = {c, -s, 0, 1.5, s, c, 0, -2, 0, 0, 0.6, 0.25};
-  const Grid grid = metaball_density({}, particles, options);
+  const volume::Grid grid = density::metaball_density({}, particles, options);
   double error = 0;
-  for (const LeafView& leaf : grid.leaves())
-    for (int n = 0; n < leaf_voxels; ++n) {
+  for (const volume::LeafView& leaf : grid.leaves())
+    for (int n = 0; n < volume::leaf_voxels; ++n) {
       const Vec3 index{1.0 * (leaf.origin[0] + (n >> 6)), 1.0 * (leaf.origin[1] + (n >> 3 & 7)),
                        1.0 * (leaf.origin[2] + (n & 7))};
       const long double exact = reference(particles, options.info.transform.to_world(index));
@@ -185,10 +186,10 @@ TEST(Density, RefusesWhatItCannotHold) {
   const Particles particles{{{0, 0, 0}, 1000, 1}};
   Context context;
   context.max_memory = 1 << 20;
-  EXPECT_THROW((void)metaball_density(context, particles, options_for(1)), Error);
-  DensityOptions stretched = options_for(1);
+  EXPECT_THROW((void)density::metaball_density(context, particles, options_for(1)), Error);
+  density::DensityOptions stretched = options_for(1);
   stretched.info.transform.m[0] = 2;
-  EXPECT_THROW((void)metaball_density({}, particles, stretched), Error);
+  EXPECT_THROW((void)density::metaball_density({}, particles, stretched), Error);
 }
 
 TEST(Density, StressStaysWithinItsErrorBounds) {
@@ -211,7 +212,7 @@ TEST(Density, NegativeControlAbsoluteFloatsFailTheOffset) {
   for (Particle& p : rounded)
     for (int axis = 0; axis < 3; ++axis)
       p.center[axis] = static_cast<double>(static_cast<float>(p.center[axis]));
-  const Grid grid = test::density_grid(rounded, 0.2);
+  const volume::Grid grid = test::density_grid(rounded, 0.2);
   EXPECT_GT(test::largest_leaf_error(grid, particles, 3), 1e-2);
 }
 
@@ -230,29 +231,30 @@ TEST(Density, EveryKernelGivesTheSameBits) {
   for (const float R : {0.4F, 3.0F, 6.0F, 12.0F, 40.0F, 1000.0F}) {
     const float outside = R < 40 ? R : R / 8; // the largest reach all voxels
     std::uniform_real_distribution<float> place(-outside, 7 + outside), weight(-1, 2);
-    std::vector<LeafParticle> particles(101); // more than a kernel takes at once
-    for (LeafParticle& p : particles)
+    std::vector<density::LeafParticle> particles(101); // more than a kernel takes at once
+    for (density::LeafParticle& p : particles)
       p = {place(random), place(random), place(random), 1 / R, weight(random)};
-    std::vector<float> expected(leaf_voxels);
-    add_density_baseline(particles.data(), particles.size(), expected.data());
+    std::vector<float> expected(volume::leaf_voxels);
+    density::add_density_baseline(particles.data(), particles.size(), expected.data());
     EXPECT_TRUE(std::ranges::any_of(expected, [](float v) { return v != 0; })) << R;
-    for (const DensityKernel kernel : density_add_kernels()) {
-      std::vector<float> values(leaf_voxels);
+    for (const density::DensityKernel kernel : density_add_kernels()) {
+      std::vector<float> values(volume::leaf_voxels);
       kernel(particles.data(), particles.size(), values.data());
-      EXPECT_EQ(std::memcmp(values.data(), expected.data(), leaf_voxels * sizeof(float)), 0) << R;
+      EXPECT_EQ(std::memcmp(values.data(), expected.data(), volume::leaf_voxels * sizeof(float)), 0)
+          << R;
     }
   }
 }
 
 TEST(Density, ListsWithParticlesOutOfReachGiveTheSameBits) {
   const Particles particles = random_particles(70, 14, 5, {}, 6);
-  std::vector<LeafParticle> all;
-  std::vector<LeafParticle> near;
+  std::vector<density::LeafParticle> all;
+  std::vector<density::LeafParticle> near;
   for (const Particle& p : particles) {
-    const LeafParticle local{static_cast<float>(p.center.x), static_cast<float>(p.center.y),
-                             static_cast<float>(p.center.z),
-                             static_cast<float>(1 / p.support_radius),
-                             static_cast<float>(p.weight)};
+    const density::LeafParticle local{
+        static_cast<float>(p.center.x), static_cast<float>(p.center.y),
+        static_cast<float>(p.center.z), static_cast<float>(1 / p.support_radius),
+        static_cast<float>(p.weight)};
     all.push_back(local);
     double distance2 = 0;
     for (int axis = 0; axis < 3; ++axis)
@@ -261,23 +263,24 @@ TEST(Density, ListsWithParticlesOutOfReachGiveTheSameBits) {
       near.push_back(local);
   }
   ASSERT_LT(near.size() + 20, all.size());
-  std::vector<float> expected(leaf_voxels);
-  add_density_baseline(near.data(), near.size(), expected.data());
-  for (const DensityKernel kernel : density_add_kernels())
+  std::vector<float> expected(volume::leaf_voxels);
+  density::add_density_baseline(near.data(), near.size(), expected.data());
+  for (const density::DensityKernel kernel : density_add_kernels())
     for (const auto* list : {&near, &all}) {
-      std::vector<float> values(leaf_voxels);
+      std::vector<float> values(volume::leaf_voxels);
       kernel(list->data(), list->size(), values.data());
-      EXPECT_EQ(std::memcmp(values.data(), expected.data(), leaf_voxels * sizeof(float)), 0);
+      EXPECT_EQ(std::memcmp(values.data(), expected.data(), volume::leaf_voxels * sizeof(float)),
+                0);
     }
 }
 
 TEST(Density, PredictsBeforeTheWork) {
   const Particles particles = random_particles(40, 20, 4, {}, 7);
-  DensityOptions options = options_for(0.4);
-  DensityReport before;
-  options.planned = [&](const DensityReport& plan) { before = plan; };
-  DensityReport after;
-  const Grid grid = metaball_density({}, particles, options, &after);
+  density::DensityOptions options = options_for(0.4);
+  density::DensityReport before;
+  options.planned = [&](const density::DensityReport& plan) { before = plan; };
+  density::DensityReport after;
+  const volume::Grid grid = density::metaball_density({}, particles, options, &after);
   EXPECT_EQ(before.leaves, 0U);
   EXPECT_EQ(before.predicted_bytes, after.predicted_bytes);
   EXPECT_GE(before.predicted_voxels, 512.0 * static_cast<double>(grid.leaves().size()));

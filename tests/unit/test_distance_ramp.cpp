@@ -20,7 +20,7 @@ namespace {
 using namespace gewebe;
 using namespace gewebe::test;
 
-const GridTransform unit_lattice = uniform_transform(1);
+const volume::GridTransform unit_lattice = volume::uniform_transform(1);
 
 Context with(int threads) {
   Context context;
@@ -28,7 +28,7 @@ Context with(int threads) {
   return context;
 }
 
-double at(GridAccessor& grid, const Int3& ijk) {
+double at(volume::GridAccessor& grid, const Int3& ijk) {
   return static_cast<double>(grid.value(ijk));
 }
 
@@ -39,7 +39,7 @@ TEST(NearestPoint, IsTheMinimumOverTheTriangle) {
   std::array<int, 7> seen{};
   for (int n = 0; n < 2000; ++n) {
     const Vec3 a = point(), b = point(), c = point(), p = point() * 2;
-    const NearestPoint nearest = nearest_on_triangle(p, a, b, c);
+    const mesh::NearestPoint nearest = mesh::nearest_on_triangle(p, a, b, c);
     ++seen[static_cast<std::size_t>(nearest.feature)];
     const double distance = norm(p - nearest.point);
     constexpr int steps = 40;
@@ -68,9 +68,11 @@ double ramp(double distance, double half_width) {
 TEST(DistanceRamp, FacesAreLinearAndEdgesAsPromised) {
   const Vec3 low{-6.3, -6.2, -6.1}, high{6.4, 6.2, 6.3};
   const TriangleMesh mesh = box_mesh(low, high);
-  const Grid round = jones_density(with(1), mesh, unit_lattice, OpenMesh::refuse);
-  const Grid sharp = sramek_density(with(1), mesh, unit_lattice, OpenMesh::refuse);
-  GridAccessor jones(round), sramek(sharp);
+  const volume::Grid round =
+      antialiasing::jones_density(with(1), mesh, unit_lattice, voxelization::OpenMesh::refuse);
+  const volume::Grid sharp =
+      antialiasing::sramek_density(with(1), mesh, unit_lattice, voxelization::OpenMesh::refuse);
+  volume::GridAccessor jones(round), sramek(sharp);
   std::size_t beyond_edges = 0;
   for (std::int32_t i = -10; i <= 10; ++i)
     for (std::int32_t j = -10; j <= 10; ++j)
@@ -85,10 +87,11 @@ TEST(DistanceRamp, FacesAreLinearAndEdgesAsPromised) {
         const double euclidean = largest > 0 ? std::sqrt(outside) : largest;
         beyond_edges += euclidean > largest && euclidean < 1;
         // Outside an edge the sharp ramp follows the planes.
-        EXPECT_NEAR(at(jones, {i, j, k}), ramp(euclidean, jones_half_width), 1e-7);
+        EXPECT_NEAR(at(jones, {i, j, k}), ramp(euclidean, antialiasing::jones_half_width), 1e-7);
         // The band ends at the Euclidean distance.
-        const double wanted =
-            euclidean < sramek_half_width ? ramp(largest, sramek_half_width) : euclidean < 0;
+        const double wanted = euclidean < antialiasing::sramek_half_width
+                                  ? ramp(largest, antialiasing::sramek_half_width)
+                                  : euclidean < 0;
         EXPECT_NEAR(at(sramek, {i, j, k}), wanted, 1e-7) << i << ' ' << j << ' ' << k;
       }
   EXPECT_GT(beyond_edges, 20u);
@@ -99,10 +102,12 @@ TEST(DistanceRamp, BandIsTheSearchOverAllTriangles) {
   TriangleMesh mesh = sphere_mesh(1, 7, {0.3, -0.2, 0.1});
   rotate(mesh, 1);
   append(mesh, sphere_mesh(1, 3, {1, 0, 0}));
-  CoverageReport report;
-  const Grid grid = jones_density(with(1), mesh, unit_lattice, OpenMesh::refuse, &report);
-  const std::set<Int3> inside = inside_voxels(scan_inside(with(1), mesh, unit_lattice, {}));
-  GridAccessor value(grid);
+  antialiasing::CoverageReport report;
+  const volume::Grid grid = antialiasing::jones_density(with(1), mesh, unit_lattice,
+                                                        voxelization::OpenMesh::refuse, &report);
+  const std::set<Int3> inside =
+      inside_voxels(voxelization::scan_inside(with(1), mesh, unit_lattice, {}));
+  volume::GridAccessor value(grid);
   double sum = 0;
   for (std::int32_t i = -10; i <= 10; ++i)
     for (std::int32_t j = -10; j <= 10; ++j)
@@ -110,12 +115,12 @@ TEST(DistanceRamp, BandIsTheSearchOverAllTriangles) {
         const Vec3 p{1.0 * i, 1.0 * j, 1.0 * k};
         double min = 1e9;
         for (const auto& [a, b, c] : mesh.triangles)
-          min = test::smaller(
-              min,
-              norm(p -
-                   nearest_on_triangle(p, mesh.points[a], mesh.points[b], mesh.points[c]).point));
+          min = test::smaller(min, norm(p - mesh::nearest_on_triangle(
+                                                p, mesh.points[a], mesh.points[b], mesh.points[c])
+                                                .point));
         const bool in = inside.contains({i, j, k});
-        EXPECT_NEAR(at(value, {i, j, k}), ramp(in ? -min : min, jones_half_width), 1e-7);
+        EXPECT_NEAR(at(value, {i, j, k}), ramp(in ? -min : min, antialiasing::jones_half_width),
+                    1e-7);
         sum += at(value, {i, j, k});
       }
   EXPECT_NEAR(report.volume, sum, 1e-9 * sum);
@@ -127,17 +132,20 @@ TEST(DistanceRamp, LargeInteriorsKeepTheirTiles) {
   // tile too: only tiles without it stay whole.
   for (const double wall : {129.4, 127.6}) {
     const TriangleMesh mesh = box_mesh({-10.2, -10.3, -10.4}, {140.2, 140.3, wall});
-    CoverageReport round, sharp;
+    antialiasing::CoverageReport round, sharp;
     for (const auto& [grid, report] :
-         {std::pair(jones_density(with(2), mesh, unit_lattice, OpenMesh::refuse, &round), &round),
-          std::pair(sramek_density(with(2), mesh, unit_lattice, OpenMesh::refuse, &sharp),
+         {std::pair(antialiasing::jones_density(with(2), mesh, unit_lattice,
+                                                voxelization::OpenMesh::refuse, &round),
+                    &round),
+          std::pair(antialiasing::sramek_density(with(2), mesh, unit_lattice,
+                                                 voxelization::OpenMesh::refuse, &sharp),
                     &sharp)}) {
-      GridAccessor value(grid);
+      volume::GridAccessor value(grid);
       for (const Int3& v : {Int3{60, 60, 60}, Int3{0, 0, 125}, Int3{120, 120, 120}})
         EXPECT_EQ(value.value(v), 1.0f);
       EXPECT_EQ(value.value({60, 60, 133}), 0.0f);
       EXPECT_LT(value.value({60, 60, static_cast<std::int32_t>(wall)}), 1.0f);
-      const double volume = volume_stats(with(1), grid).volume;
+      const double volume = volume::volume_stats(with(1), grid).volume;
       EXPECT_LT(std::fabs(volume / (150.4 * 150.6 * (wall + 10.4)) - 1), 1e-3);
       EXPECT_NEAR(report->volume, volume, 1e-9 * volume); // no voxel counts twice
     }
@@ -154,9 +162,11 @@ TEST(DistanceRamp, SurfaceStaysWhereItIs) {
   }();
   const double height = dot(normal, mesh.points[4]);
   for (const bool sharp : {false, true}) {
-    const Grid grid = sharp ? sramek_density(with(1), mesh, unit_lattice, OpenMesh::refuse)
-                            : jones_density(with(1), mesh, unit_lattice, OpenMesh::refuse);
-    GridAccessor value(grid);
+    const volume::Grid grid = sharp ? antialiasing::sramek_density(with(1), mesh, unit_lattice,
+                                                                   voxelization::OpenMesh::refuse)
+                                    : antialiasing::jones_density(with(1), mesh, unit_lattice,
+                                                                  voxelization::OpenMesh::refuse);
+    volume::GridAccessor value(grid);
     for (std::int32_t i = -2; i <= 2; ++i)
       for (std::int32_t j = -2; j <= 2; ++j)
         for (std::int32_t k = -12; k < 12; ++k) {
@@ -179,27 +189,32 @@ TEST(DistanceRamp, NormalsOfASphereForEachFilter) {
   const TriangleMesh mesh = sphere_mesh(5, 20, center);
   struct Case {
     const char* filter;
-    Grid grid;
+    volume::Grid grid;
     double mean, p99;
   };
-  VoxelizeOptions box;
+  voxelization::VoxelizeOptions box;
   box.samples = 4;
-  const auto refuse = OpenMesh::refuse;
+  const auto refuse = voxelization::OpenMesh::refuse;
   std::vector<Case> cases;
-  cases.push_back({"jones", jones_density(with(1), mesh, unit_lattice, refuse), 1.4, 5.5});
-  cases.push_back({"sramek", sramek_density(with(1), mesh, unit_lattice, refuse), 0.05, 0.12});
-  cases.push_back({"exact", *exact_coverage(with(1), mesh, unit_lattice, refuse), 7.5, 17});
-  cases.push_back({"box:4", voxelize(with(1), mesh, unit_lattice, box), 7.6, 18});
-  cases.push_back({"none", voxelize(with(1), mesh, unit_lattice, {}), 15, 42});
+  cases.push_back(
+      {"jones", antialiasing::jones_density(with(1), mesh, unit_lattice, refuse), 1.4, 5.5});
+  cases.push_back(
+      {"sramek", antialiasing::sramek_density(with(1), mesh, unit_lattice, refuse), 0.05, 0.12});
+  cases.push_back(
+      {"exact", *antialiasing::exact_coverage(with(1), mesh, unit_lattice, refuse), 7.5, 17});
+  cases.push_back({"box:4", voxelization::voxelize(with(1), mesh, unit_lattice, box), 7.6, 18});
+  cases.push_back({"none", voxelization::voxelize(with(1), mesh, unit_lattice, {}), 15, 42});
   cases.push_back({"winding",
-                   jones_density(with(1), mesh, unit_lattice, refuse, nullptr, VoxelRule::winding),
+                   antialiasing::jones_density(with(1), mesh, unit_lattice, refuse, nullptr,
+                                               voxelization::VoxelRule::winding),
                    1.4, 5.5});
   cases.push_back({"zbuffer",
-                   jones_density(with(1), mesh, unit_lattice, refuse, nullptr, VoxelRule::zbuffer),
+                   antialiasing::jones_density(with(1), mesh, unit_lattice, refuse, nullptr,
+                                               voxelization::VoxelRule::zbuffer),
                    1.4, 5.5});
   for (const Case& c : cases) {
-    TriangleMesh surface = marching_cubes(with(1), c.grid).mesh;
-    gradient_normals(with(1), c.grid, surface);
+    TriangleMesh surface = surface::marching_cubes(with(1), c.grid).mesh;
+    surface::gradient_normals(with(1), c.grid, surface);
     std::vector<double> angles;
     double sum = 0;
     for (std::size_t i = 0; i < surface.points.size(); ++i) {
@@ -221,14 +236,18 @@ TEST(DistanceRamp, NormalsOfASphereForEachFilter) {
 TEST(DistanceRamp, OtherRulesGiveTheSign) {
   // An open box is one to the winding rule; beside its hole, where no face is, it is as by parity.
   TriangleMesh open = box_mesh({0.2, 0.2, 0.2}, {10.2, 1.3, 5.5});
-  const Grid whole = jones_density(with(1), open, unit_lattice, OpenMesh::refuse);
+  const volume::Grid whole =
+      antialiasing::jones_density(with(1), open, unit_lattice, voxelization::OpenMesh::refuse);
   open.triangles.erase(open.triangles.begin());
-  EXPECT_THROW(jones_density(with(1), open, unit_lattice, OpenMesh::refuse), Error);
-  CoverageReport report;
-  const Grid film =
-      jones_density(with(1), open, unit_lattice, OpenMesh::refuse, &report, VoxelRule::winding);
+  EXPECT_THROW(
+      antialiasing::jones_density(with(1), open, unit_lattice, voxelization::OpenMesh::refuse),
+      Error);
+  antialiasing::CoverageReport report;
+  const volume::Grid film =
+      antialiasing::jones_density(with(1), open, unit_lattice, voxelization::OpenMesh::refuse,
+                                  &report, voxelization::VoxelRule::winding);
   EXPECT_EQ(report.mesh.boundary_edges, 3u);
-  GridAccessor a(film), b(whole);
+  volume::GridAccessor a(film), b(whole);
   for (std::int32_t i = -1; i < 12; ++i)
     for (std::int32_t j = -1; j < 12; ++j)
       for (std::int32_t k = 3; k < 12; ++k)
@@ -236,13 +255,16 @@ TEST(DistanceRamp, OtherRulesGiveTheSign) {
   // Solids that overlap are one: no value of it falls below ½ inside.
   TriangleMesh two = sphere_mesh(3, 8, {0.3, 0, 0});
   append(two, sphere_mesh(3, 8, {6.3, 0, 0}));
-  const Grid one =
-      jones_density(with(1), two, unit_lattice, OpenMesh::refuse, nullptr, VoxelRule::winding);
-  GridAccessor value(one);
+  const volume::Grid one =
+      antialiasing::jones_density(with(1), two, unit_lattice, voxelization::OpenMesh::refuse,
+                                  nullptr, voxelization::VoxelRule::winding);
+  volume::GridAccessor value(one);
   for (std::int32_t i = -5; i <= 11; ++i)
     EXPECT_GE(at(value, {i, 0, 0}), 0.5);
-  const Grid hollow = jones_density(with(1), two, unit_lattice, OpenMesh::refuse);
-  EXPECT_EQ(GridAccessor(hollow).value({3, 0, 0}), 0.0f); // parity leaves the common part out
+  const volume::Grid hollow =
+      antialiasing::jones_density(with(1), two, unit_lattice, voxelization::OpenMesh::refuse);
+  EXPECT_EQ(volume::GridAccessor(hollow).value({3, 0, 0}),
+            0.0f); // parity leaves the common part out
 }
 
 /// Points of the boundary of a union of boxes: a fine lattice on each face, less what lies strictly
@@ -292,11 +314,13 @@ TEST(DistanceRamp, FacesInsideTheWindingSolidDoNotCount) {
     for (const auto& [low, high] : boxes)
       append(mesh, box_mesh(low, high));
     const std::vector<Vec3> boundary = boundary_samples(boxes);
-    const Grid grid =
-        jones_density(with(1), mesh, unit_lattice, OpenMesh::refuse, nullptr, VoxelRule::winding);
-    const Grid sharp =
-        sramek_density(with(1), mesh, unit_lattice, OpenMesh::refuse, nullptr, VoxelRule::winding);
-    GridAccessor value(grid), sramek(sharp);
+    const volume::Grid grid =
+        antialiasing::jones_density(with(1), mesh, unit_lattice, voxelization::OpenMesh::refuse,
+                                    nullptr, voxelization::VoxelRule::winding);
+    const volume::Grid sharp =
+        antialiasing::sramek_density(with(1), mesh, unit_lattice, voxelization::OpenMesh::refuse,
+                                     nullptr, voxelization::VoxelRule::winding);
+    volume::GridAccessor value(grid), sramek(sharp);
     for (std::int32_t i = -7; i <= 7; ++i)
       for (std::int32_t j = -7; j <= 7; ++j)
         for (std::int32_t k = -7; k <= 7; ++k) {
@@ -306,7 +330,8 @@ TEST(DistanceRamp, FacesInsideTheWindingSolidDoNotCount) {
             squared = test::smaller(squared, dot(p - q, p - q));
           const bool in = at(value, {i, j, k}) > 0.5;
           const double distance = std::sqrt(squared);
-          EXPECT_NEAR(at(value, {i, j, k}), ramp(in ? -distance : distance, jones_half_width), 0.04)
+          EXPECT_NEAR(at(value, {i, j, k}),
+                      ramp(in ? -distance : distance, antialiasing::jones_half_width), 0.04)
               << i << ' ' << j << ' ' << k;
           if (in) {
             EXPECT_GE(at(sramek, {i, j, k}), 0.5 + std::fmin(0.5, distance / 6.3) - 0.04)
@@ -320,9 +345,10 @@ TEST(DistanceRamp, FacesInsideTheWindingSolidDoNotCount) {
   std::swap(two.triangles[7][1], two.triangles[7][2]);
   for (std::size_t n = two.triangles.size() / 2; n < two.triangles.size(); ++n)
     std::swap(two.triangles[n][1], two.triangles[n][2]);
-  const Grid one =
-      jones_density(with(1), two, unit_lattice, OpenMesh::refuse, nullptr, VoxelRule::winding);
-  GridAccessor value(one);
+  const volume::Grid one =
+      antialiasing::jones_density(with(1), two, unit_lattice, voxelization::OpenMesh::refuse,
+                                  nullptr, voxelization::VoxelRule::winding);
+  volume::GridAccessor value(one);
   for (std::int32_t i = -10; i <= 16; ++i)
     for (std::int32_t j = -9; j <= 9; ++j)
       for (std::int32_t k = -9; k <= 9; ++k) {
@@ -340,17 +366,22 @@ TEST(DistanceRamp, FacesInsideTheWindingSolidDoNotCount) {
               inside = test::smaller(inside, n == 0 ? a : b);
           }
         }
-        EXPECT_NEAR(at(value, {i, j, k}), ramp(-inside, jones_half_width), 0.09)
+        EXPECT_NEAR(at(value, {i, j, k}), ramp(-inside, antialiasing::jones_half_width), 0.09)
             << i << ' ' << j << ' ' << k;
       }
 }
 
 TEST(DistanceRamp, SameBytesForAnyThreads) {
   const TriangleMesh mesh = sphere_mesh(3, 40, {0.3, 0.1, 0.2});
-  EXPECT_EQ(jones_density(with(1), mesh, unit_lattice, OpenMesh::refuse).digest(),
-            jones_density(with(2), mesh, unit_lattice, OpenMesh::refuse).digest());
-  EXPECT_EQ(sramek_density(with(1), mesh, unit_lattice, OpenMesh::refuse).digest(),
-            sramek_density(with(2), mesh, unit_lattice, OpenMesh::refuse).digest());
+  EXPECT_EQ(antialiasing::jones_density(with(1), mesh, unit_lattice, voxelization::OpenMesh::refuse)
+                .digest(),
+            antialiasing::jones_density(with(2), mesh, unit_lattice, voxelization::OpenMesh::refuse)
+                .digest());
+  EXPECT_EQ(
+      antialiasing::sramek_density(with(1), mesh, unit_lattice, voxelization::OpenMesh::refuse)
+          .digest(),
+      antialiasing::sramek_density(with(2), mesh, unit_lattice, voxelization::OpenMesh::refuse)
+          .digest());
 }
 
 // Needles meet many leaves with little area: neither their area nor the longest of them tells how
@@ -367,7 +398,7 @@ TEST(DistanceRamp, NeedlesHoldTheLimitOfMemory) {
   }
   Context context;
   context.max_memory = std::uint64_t{300} << 20;
-  const GridTransform voxels = uniform_transform(1);
+  const volume::GridTransform voxels = volume::uniform_transform(1);
   const auto refused = [&](auto&& work) {
     try {
       (void)work();
@@ -376,30 +407,45 @@ TEST(DistanceRamp, NeedlesHoldTheLimitOfMemory) {
       EXPECT_NE(std::string(error.what()).find("--max-memory"), std::string::npos) << error.what();
     }
   };
-  refused([&] { return jones_density(context, mesh, voxels, OpenMesh::refuse, nullptr); });
-  refused([&] { return exact_coverage(context, mesh, voxels, OpenMesh::refuse, nullptr); });
+  refused([&] {
+    return antialiasing::jones_density(context, mesh, voxels, voxelization::OpenMesh::refuse,
+                                       nullptr);
+  });
+  refused([&] {
+    return antialiasing::exact_coverage(context, mesh, voxels, voxelization::OpenMesh::refuse,
+                                        nullptr);
+  });
   mesh.triangles.resize(8); // two of them are no problem
-  EXPECT_GT(jones_density(context, mesh, voxels, OpenMesh::refuse, nullptr).active_voxels(), 1000u);
+  EXPECT_GT(
+      antialiasing::jones_density(context, mesh, voxels, voxelization::OpenMesh::refuse, nullptr)
+          .active_voxels(),
+      1000u);
 }
 
 TEST(DistanceRamp, OpenMeshesAndNeedles) {
   TriangleMesh open = box_mesh({0.2, 0.2, 0.2}, {10.2, 10.2, 10.2});
   open.triangles.erase(open.triangles.begin(), open.triangles.begin() + 2);
-  EXPECT_THROW(jones_density(with(1), open, unit_lattice, OpenMesh::refuse), Error);
-  const Grid filled = jones_density(with(1), open, unit_lattice, OpenMesh::fill);
-  const Grid whole = jones_density(with(1), box_mesh({0.2, 0.2, 0.2}, {10.2, 10.2, 10.2}),
-                                   unit_lattice, OpenMesh::refuse);
-  GridAccessor a(filled), b(whole);
+  EXPECT_THROW(
+      antialiasing::jones_density(with(1), open, unit_lattice, voxelization::OpenMesh::refuse),
+      Error);
+  const volume::Grid filled =
+      antialiasing::jones_density(with(1), open, unit_lattice, voxelization::OpenMesh::fill);
+  const volume::Grid whole =
+      antialiasing::jones_density(with(1), box_mesh({0.2, 0.2, 0.2}, {10.2, 10.2, 10.2}),
+                                  unit_lattice, voxelization::OpenMesh::refuse);
+  volume::GridAccessor a(filled), b(whole);
   for (std::int32_t i = -1; i < 12; ++i)
     for (std::int32_t k = -1; k < 12; ++k)
       EXPECT_NEAR(at(a, {i, 5, k}), at(b, {i, 5, k}), 1e-6);
-  const Grid skipped = sramek_density(with(1), open, unit_lattice, OpenMesh::skip);
-  EXPECT_LE(volume_stats(with(1), skipped).max, 0.5); // nothing is inside
-  TriangleMesh needle;                                // no area to speak of: values stay finite
+  const volume::Grid skipped =
+      antialiasing::sramek_density(with(1), open, unit_lattice, voxelization::OpenMesh::skip);
+  EXPECT_LE(volume::volume_stats(with(1), skipped).max, 0.5); // nothing is inside
+  TriangleMesh needle; // no area to speak of: values stay finite
   needle.points = {{-3, -3, -3}, {3, 3, 3}, {0, 0, 0}, {0, 0, 1e-13}};
   needle.triangles = {{0, 1, 2}, {0, 3, 1}, {0, 2, 3}, {1, 3, 2}};
-  const VolumeStats stats =
-      volume_stats(with(1), sramek_density(with(1), needle, unit_lattice, OpenMesh::refuse));
+  const volume::VolumeStats stats =
+      volume::volume_stats(with(1), antialiasing::sramek_density(with(1), needle, unit_lattice,
+                                                                 voxelization::OpenMesh::refuse));
   EXPECT_GE(stats.min, 0);
   EXPECT_LE(stats.max, 1);
 }

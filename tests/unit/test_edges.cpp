@@ -14,7 +14,7 @@
 #include <utility>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::test {
 namespace {
 
 using Ends = std::array<std::uint32_t, 2>;
@@ -61,19 +61,20 @@ std::map<Ends, std::vector<SideOfFace>> edges_by_map(const std::vector<Triangle>
   return edges;
 }
 
-void expect_equal(const EdgeSides& sides, const std::map<Ends, std::vector<SideOfFace>>& expected) {
+void expect_equal(const mesh::EdgeSides& sides,
+                  const std::map<Ends, std::vector<SideOfFace>>& expected) {
   auto at = expected.begin();
-  sides.for_each_edge([&](std::uint32_t low, std::span<const EdgeSide> edge) {
+  sides.for_each_edge([&](std::uint32_t low, std::span<const mesh::EdgeSide> edge) {
     ASSERT_NE(at, expected.end());
     EXPECT_EQ((Ends{low, edge[0].high()}), at->first);
     std::vector<SideOfFace> runs;
     int forward = 0;
-    for (const EdgeSide& s : edge) {
+    for (const mesh::EdgeSide& s : edge) {
       runs.push_back({s.face(), s.low_corner(), s.high_corner(), s.corner(), s.backward()});
       forward += s.backward() ? -1 : 1;
     }
     EXPECT_EQ(runs, at->second);
-    EXPECT_EQ(surplus(edge), forward);
+    EXPECT_EQ(mesh::surplus(edge), forward);
     ++at;
   });
   EXPECT_EQ(at, expected.end());
@@ -87,12 +88,12 @@ TEST(Edges, SidesAndTableEqualAMap) {
         round == 0 ? std::vector<Triangle>()
                    : random_triangles(random, round < 20 ? 60 : 9000, points);
     const auto expected = edges_by_map(triangles);
-    expect_equal(EdgeSides(points, triangles), expected);
+    expect_equal(mesh::EdgeSides(points, triangles), expected);
     Context two;
     two.threads = 2;
-    expect_equal(EdgeSides(points, triangles, two), expected);
+    expect_equal(mesh::EdgeSides(points, triangles, two), expected);
 
-    const EdgeTable table = edge_table(triangles, points, two);
+    const mesh::EdgeTable table = mesh::edge_table(triangles, points, two);
     ASSERT_EQ(table.size(), expected.size());
     std::size_t e = 0;
     for (const auto& [ends, runs] : expected) {
@@ -104,7 +105,7 @@ TEST(Edges, SidesAndTableEqualAMap) {
       ++e;
     }
   }
-  expect_equal(EdgeSides(1002, fan(1000)), edges_by_map(fan(1000)));
+  expect_equal(mesh::EdgeSides(1002, fan(1000)), edges_by_map(fan(1000)));
 }
 
 TEST(Edges, BordersEqualThoseOfAMap) {
@@ -115,7 +116,8 @@ TEST(Edges, BordersEqualThoseOfAMap) {
     for (const auto& [ends, runs] : edges_by_map(triangles))
       if (runs.size() == 1)
         open.insert(ends.begin(), ends.end());
-    EXPECT_EQ(border_points(20, triangles), std::vector<std::uint32_t>(open.begin(), open.end()));
+    EXPECT_EQ(mesh::border_points(20, triangles),
+              std::vector<std::uint32_t>(open.begin(), open.end()));
   }
 }
 
@@ -126,16 +128,16 @@ TEST(Edges, OppositeSidesJoinFaces) {
     two.push_back({t[0] + 4, t[1] + 4, t[2] + 4});
   std::vector<std::uint32_t> set;
   DisjointSets faces(8);
-  EXPECT_TRUE(join_opposite_sides(8, two, faces));
+  EXPECT_TRUE(mesh::join_opposite_sides(8, two, faces));
   EXPECT_EQ(faces.number(set), 2U);
-  EXPECT_TRUE(closed_by_index(8, two));
+  EXPECT_TRUE(mesh::closed_by_index(8, two));
 
   std::swap(two[5][0], two[5][1]); // closed, but one face disagrees
   DisjointSets again(8);
-  EXPECT_FALSE(join_opposite_sides(8, two, again));
-  EXPECT_TRUE(closed_by_index(8, two));
+  EXPECT_FALSE(mesh::join_opposite_sides(8, two, again));
+  EXPECT_TRUE(mesh::closed_by_index(8, two));
   two.pop_back();
-  EXPECT_FALSE(closed_by_index(8, two));
+  EXPECT_FALSE(mesh::closed_by_index(8, two));
 }
 
 TEST(RepeatedFaces, EqualThoseOfPairwiseComparison) {
@@ -153,9 +155,9 @@ TEST(RepeatedFaces, EqualThoseOfPairwiseComparison) {
     std::vector<std::int32_t> part;
     for (std::size_t f = 0; f < triangles.size() && round % 2 != 0; ++f)
       part.push_back(static_cast<std::int32_t>(random() % 3));
-    for (const SameFace same : {SameFace::corners, SameFace::orientation}) {
-      if (same == SameFace::orientation) {
-        std::erase_if(triangles, has_equal_corners);
+    for (const mesh::SameFace same : {mesh::SameFace::corners, mesh::SameFace::orientation}) {
+      if (same == mesh::SameFace::orientation) {
+        std::erase_if(triangles, mesh::has_equal_corners);
         part.resize(part.empty() ? 0 : triangles.size());
       }
       std::vector<bool> expected(triangles.size());
@@ -163,14 +165,14 @@ TEST(RepeatedFaces, EqualThoseOfPairwiseComparison) {
         for (std::size_t f = 0; f < g; ++f) {
           const Triangle &a = triangles[f], &b = triangles[g];
           const bool equal =
-              same == SameFace::corners ? sorted(a) == sorted(b) : rotated(a) == rotated(b);
+              same == mesh::SameFace::corners ? sorted(a) == sorted(b) : rotated(a) == rotated(b);
           if (equal && (part.empty() || part[f] == part[g]))
             expected[g] = true;
         }
-      EXPECT_EQ(repeated_faces(6, triangles, same, part), expected);
+      EXPECT_EQ(mesh::repeated_faces(6, triangles, same, part), expected);
     }
   }
 }
 
 } // namespace
-} // namespace gewebe
+} // namespace gewebe::test

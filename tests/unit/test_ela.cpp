@@ -11,18 +11,18 @@
 #include <random>
 #include <string>
 
-namespace gewebe {
+namespace gewebe::test {
 namespace {
 
-Model rich_model() {
+model::Model rich_model() {
   TriangleMesh mesh = test::joined(test::octahedron(), test::ball(1, 0.3, {5, 0, 0}));
   mesh.texcoords.assign(mesh.triangles.size(), {0, 0.1F, 0.2F, 0.3F, 0.4F, 1});
-  BuildOptions options;
-  options.material = parse_material_choice("liver,1=gallbladder");
+  model::BuildOptions options;
+  options.material = model::parse_material_choice("liver,1=gallbladder");
   options.bend = options.normals = true;
-  Model model = build_model(mesh, options, Context{}).model;
+  model::Model model = model::build_model(mesh, options, Context{}).model;
   model.materials[0].poisson = 0.25;
-  model.materials[0].law = parse_law("ogden:alpha1=4,alpha2=-3,mu2=0.3");
+  model.materials[0].law = model::parse_law("ogden:alpha1=4,alpha2=-3,mu2=0.3");
   model.tetrahedra = {{0, 2, 5, 4}, {0, 3, 4, 5}};
   model.tetrahedron_material = {0, 0};
   model.name = "two balls, Größe 1";
@@ -31,7 +31,7 @@ Model rich_model() {
 
 /// The complaint about a text as "LINE: what", or "" if it is read.
 std::string complaint(std::string_view text) {
-  const std::string said = test::complaint([&] { return parse_ela(text, "M"); });
+  const std::string said = test::complaint([&] { return formats::parse_ela(text, "M"); });
   EXPECT_TRUE(said.empty() || said.starts_with("M:")) << said;
   EXPECT_EQ(said.find('\n'), std::string::npos);
   return said.empty() ? said : said.substr(2);
@@ -62,19 +62,19 @@ std::string replaced(std::string text, const std::string& from, const std::strin
 }
 
 TEST(Ela, ReadsWhatItWrites) {
-  const Model model = rich_model();
-  const std::string text = ela_text(model);
-  const Model back = parse_ela(text, "M");
+  const model::Model model = rich_model();
+  const std::string text = formats::ela_text(model);
+  const model::Model back = formats::parse_ela(text, "M");
   EXPECT_EQ(back, model);
-  EXPECT_EQ(ela_text(back), text);
-  EXPECT_EQ(model_digest(back), model_digest(model));
+  EXPECT_EQ(formats::ela_text(back), text);
+  EXPECT_EQ(model::model_digest(back), model::model_digest(model));
   EXPECT_EQ(text.substr(0, 11), "ela_expl 1\n");
   EXPECT_EQ(text.substr(text.size() - 5), "\nend\n");
 }
 
 TEST(Ela, DoublesOfAnyKindSurvive) {
   std::mt19937_64 random(3);
-  Model model = parse_ela(small, "M");
+  model::Model model = formats::parse_ela(small, "M");
   for (int round = 0; round < 3000; ++round) {
     for (double* value : {&model.nodes[0].mass, &model.nodes[1].drag, &model.springs[0].stiffness,
                           &model.springs[1].damping, &model.springs[2].rest}) {
@@ -83,26 +83,26 @@ TEST(Ela, DoublesOfAnyKindSurvive) {
         std::memcpy(value, &bits, sizeof bits);
       } while (!std::isfinite(*value));
     }
-    const Model back = parse_ela(ela_text(model), "M");
+    const model::Model back = formats::parse_ela(formats::ela_text(model), "M");
     ASSERT_EQ(back, model);
   }
   model.nodes[0].position = {-0.0, 5e-324, -1.5e100};
   model.nodes[2].mass = std::numeric_limits<double>::max();
-  const Model back = parse_ela(ela_text(model), "M");
+  const model::Model back = formats::parse_ela(formats::ela_text(model), "M");
   EXPECT_EQ(back, model);
   EXPECT_TRUE(std::signbit(back.nodes[0].position.x));
 }
 
 TEST(Ela, SameBytesForAnyThreads) {
-  const Model model =
-      build_model(test::ball(6, 50), {}, Context{}).model; // more than one batch of lines
-  const std::string text = ela_text(model);
-  EXPECT_EQ(parse_ela(text, "M"), model);
+  const model::Model model =
+      model::build_model(test::ball(6, 50), {}, Context{}).model; // more than one batch of lines
+  const std::string text = formats::ela_text(model);
+  EXPECT_EQ(formats::parse_ela(text, "M"), model);
   EXPECT_GT(text.size(), 1U << 20);
 }
 
 TEST(Ela, EveryTruncatedPrefixFails) {
-  for (const std::string& text : {small, ela_text(rich_model())}) {
+  for (const std::string& text : {small, formats::ela_text(rich_model())}) {
     ASSERT_EQ(complaint(text), "");
     for (std::size_t size = 0; size < text.size(); ++size)
       ASSERT_NE(complaint(std::string_view(text).substr(0, size)), "") << size;
@@ -110,11 +110,11 @@ TEST(Ela, EveryTruncatedPrefixFails) {
 }
 
 TEST(Ela, CommentsBlanksAndLineEndsMayStandAnywhere) {
-  const Model plain = parse_ela(small, "M");
+  const model::Model plain = formats::parse_ela(small, "M");
   std::string loose = "# by hand\n\n";
   for (const char c : small)
     loose += c == '\n' ? std::string("\t # a comment\r\n\n  # another\n") : std::string(1, c);
-  EXPECT_EQ(parse_ela(loose, "M"), plain);
+  EXPECT_EQ(formats::parse_ela(loose, "M"), plain);
   EXPECT_EQ(complaint(small + "\n# the last words\n"), "");
 }
 
@@ -242,17 +242,17 @@ const std::string element = "ela_expl 1\n"
                             "end\n";
 
 TEST(Ela, ReadsElementsOfBothOrders) {
-  const Model quadratic = parse_ela(element, "M");
+  const model::Model quadratic = formats::parse_ela(element, "M");
   EXPECT_EQ(quadratic.tetrahedra, (std::vector<Tetrahedron>{{0, 1, 2, 3}}));
   EXPECT_EQ(quadratic.middles, (std::vector<EdgeMiddles>{{4, 5, 6, 7, 8, 9}}));
   EXPECT_EQ(quadratic.tetrahedron_material, std::vector<std::int32_t>{0});
   EXPECT_EQ(quadratic.materials[0].poisson, 0.49);
   EXPECT_FALSE(quadratic.materials[1].poisson.has_value());
-  EXPECT_EQ(ela_text(quadratic), element);
+  EXPECT_EQ(formats::ela_text(quadratic), element);
   const std::string text = replaced(element, "3 4 5 6 7 8 9 0\n", "3 0\n");
-  const Model linear = parse_ela(text, "M");
+  const model::Model linear = formats::parse_ela(text, "M");
   EXPECT_TRUE(linear.middles.empty());
-  EXPECT_EQ(ela_text(linear), text);
+  EXPECT_EQ(formats::ela_text(linear), text);
 }
 
 TEST(Ela, ErrorsOfElements) {
@@ -282,12 +282,13 @@ TEST(Ela, ErrorsOfElements) {
 }
 
 TEST(Ela, TenThousandNodesTakeAHundredthOfASecond) {
-  const Model model = build_model(test::ball(6, 50), {}, Context{}).model; // 16,386 nodes
-  const std::string text = ela_text(model);
+  const model::Model model =
+      model::build_model(test::ball(6, 50), {}, Context{}).model; // 16,386 nodes
+  const std::string text = formats::ela_text(model);
   double best = 1e9;
   for (int round = 0; round < 3; ++round) {
     const auto start = std::chrono::steady_clock::now();
-    const Model back = parse_ela(text, "M");
+    const model::Model back = formats::parse_ela(text, "M");
     best = test::smaller(
         best, std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count());
     EXPECT_EQ(back.nodes.size(), model.nodes.size());
@@ -298,4 +299,4 @@ TEST(Ela, TenThousandNodesTakeAHundredthOfASecond) {
 }
 
 } // namespace
-} // namespace gewebe
+} // namespace gewebe::test

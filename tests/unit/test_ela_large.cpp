@@ -18,7 +18,7 @@
 #include <utility>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::test {
 namespace {
 
 Context on_threads(int count) {
@@ -27,15 +27,15 @@ Context on_threads(int count) {
   return context;
 }
 
-const Model& large_model() {
-  static const Model model = [] {
-    TriangleMesh mesh = primitive_mesh(parse_primitive("plane:70x60", ""));
+const model::Model& large_model() {
+  static const model::Model model = [] {
+    TriangleMesh mesh = model::primitive_mesh(model::parse_primitive("plane:70x60", ""));
     for (std::size_t p = 0; p < mesh.points.size(); ++p)
       mesh.points[p].z = 0.01 * static_cast<double>(p % 7);
     mesh.texcoords.assign(mesh.triangles.size(), {0, 0.1F, 0.2F, 0.3F, 0.4F, 1});
-    BuildOptions options;
+    model::BuildOptions options;
     options.bend = options.normals = true;
-    return build_model(mesh, options, Context{}).model;
+    return model::build_model(mesh, options, Context{}).model;
   }();
   return model;
 }
@@ -67,30 +67,30 @@ std::size_t line_of_section(const std::vector<std::string>& lines, std::string_v
 std::string complaint(const std::vector<std::string>& lines) {
   std::vector<std::string> said;
   for (const int threads : {1, 2})
-    said.push_back(
-        test::complaint([&] { return parse_ela(text_of(lines), "M", on_threads(threads)); }));
+    said.push_back(test::complaint(
+        [&] { return formats::parse_ela(text_of(lines), "M", on_threads(threads)); }));
   EXPECT_EQ(said[0], said[1]);
   return said[0].empty() ? said[0] : said[0].substr(2);
 }
 
 TEST(ElaLarge, ReadsWhatItWrites) {
-  const Model& model = large_model();
-  const std::string text = ela_text(model);
+  const model::Model& model = large_model();
+  const std::string text = formats::ela_text(model);
   ASSERT_GT(text.size(), std::size_t{4} << 18); // several pieces
   ASSERT_GT(model.nodes.size(), 4096U);
-  EXPECT_TRUE(parse_ela(text, "M", on_threads(1)) == model);
-  EXPECT_TRUE(parse_ela(text, "M", on_threads(2)) == model);
+  EXPECT_TRUE(formats::parse_ela(text, "M", on_threads(1)) == model);
+  EXPECT_TRUE(formats::parse_ela(text, "M", on_threads(2)) == model);
 }
 
 TEST(ElaLarge, CommentsAndBlankLinesMayStandAnywhere) {
   std::mt19937 random(5);
   std::vector<std::string> lines;
-  for (const std::string& line : lines_of(ela_text(large_model()))) {
+  for (const std::string& line : lines_of(formats::ela_text(large_model()))) {
     if (random() % 7 == 0)
       lines.emplace_back(random() % 2 == 0 ? "" : "  # nodes 7");
     lines.push_back(line + (random() % 9 == 0 ? " # 3" : ""));
   }
-  EXPECT_TRUE(parse_ela(text_of(lines), "M", on_threads(2)) == large_model());
+  EXPECT_TRUE(formats::parse_ela(text_of(lines), "M", on_threads(2)) == large_model());
   // Lines behind them are counted, too.
   const std::size_t end = line_of_section(lines, "end");
   lines[end] = "stop";
@@ -99,10 +99,10 @@ TEST(ElaLarge, CommentsAndBlankLinesMayStandAnywhere) {
 }
 
 TEST(ElaLarge, EachFaultHasItsLine) {
-  const std::vector<std::string> whole = lines_of(ela_text(large_model()));
+  const std::vector<std::string> whole = lines_of(formats::ela_text(large_model()));
   std::mt19937 random(6);
   using Sections = std::vector<std::pair<std::string, std::size_t>>;
-  const Model& model = large_model();
+  const model::Model& model = large_model();
   for (const auto& [name, count] : Sections{{"nodes", model.nodes.size()},
                                             {"normals", model.normals.size()},
                                             {"springs", model.springs.size()},
@@ -126,7 +126,7 @@ TEST(ElaLarge, EachFaultHasItsLine) {
 }
 
 TEST(ElaLarge, EachFaultOfTheModelHasItsLine) {
-  const std::vector<std::string> whole = lines_of(ela_text(large_model()));
+  const std::vector<std::string> whole = lines_of(formats::ela_text(large_model()));
   const std::size_t nodes = line_of_section(whole, "nodes"),
                     springs = line_of_section(whole, "springs");
   const auto said = [&](std::size_t at, const std::string& line) {
@@ -149,18 +149,18 @@ TEST(ElaLarge, EachFaultOfTheModelHasItsLine) {
 }
 
 TEST(ElaLarge, AnEdgeAmongTheBendingSpringsIsFoundSideBySide) {
-  const std::size_t edges = spring_count(large_model(), SpringKind::edge);
-  ASSERT_GT(spring_count(large_model(), SpringKind::bend), 8000U);
+  const std::size_t edges = model::spring_count(large_model(), model::SpringKind::edge);
+  ASSERT_GT(model::spring_count(large_model(), model::SpringKind::bend), 8000U);
   for (std::size_t n = 7; n < edges; n += edges / 6) {
-    Model model = large_model();
-    Spring twice = model.springs[n];
-    twice.kind = SpringKind::bend;
-    const auto before = [](const Spring& a, const Spring& b) {
+    model::Model model = large_model();
+    model::Spring twice = model.springs[n];
+    twice.kind = model::SpringKind::bend;
+    const auto before = [](const model::Spring& a, const model::Spring& b) {
       return std::tie(a.kind, a.i, a.j) < std::tie(b.kind, b.i, b.j);
     };
     model.springs.insert(std::ranges::lower_bound(model.springs, twice, before), twice);
     try {
-      check_model(model, on_threads(2));
+      model::check_model(model, on_threads(2));
       ADD_FAILURE() << n;
     } catch (const Error& error) {
       EXPECT_NE(std::string(error.what()).find("is of kind e and of kind b"), std::string::npos);
@@ -173,17 +173,17 @@ TEST(ElaLarge, ChecksSideBySideSayWhatOneByOneDo) {
   const auto said = [](const auto& check) -> std::string {
     try {
       check();
-    } catch (const Error& error) {
+    } catch (const gewebe::Error& error) {
       return error.what();
     }
     return "";
   };
-  EXPECT_EQ(said([] { check_model(large_model(), on_threads(2)); }), "");
+  EXPECT_EQ(said([] { model::check_model(large_model(), on_threads(2)); }), "");
   int refused = 0;
   for (int round = 0; round < 40; ++round) {
-    Model model = large_model();
+    model::Model model = large_model();
     for (int fault = 0; fault < 2; ++fault) {
-      Spring& s = model.springs[random() % model.springs.size()];
+      model::Spring& s = model.springs[random() % model.springs.size()];
       switch (random() % 4) {
       case 0:
         s.j = model.springs[random() % model.springs.size()].j;
@@ -192,18 +192,18 @@ TEST(ElaLarge, ChecksSideBySideSayWhatOneByOneDo) {
         s.damping = -1;
         break;
       case 2:
-        s.kind = SpringKind::bend;
+        s.kind = model::SpringKind::bend;
         break;
       default:
         std::swap(s, model.springs[random() % model.springs.size()]);
       }
     }
-    const std::string one = said([&] { check_model(model); });
-    EXPECT_EQ(said([&] { check_model(model, on_threads(2)); }), one);
+    const std::string one = said([&] { model::check_model(model); });
+    EXPECT_EQ(said([&] { model::check_model(model, on_threads(2)); }), one);
     refused += one.empty() ? 0 : 1;
   }
   EXPECT_GT(refused, 35);
 }
 
 } // namespace
-} // namespace gewebe
+} // namespace gewebe::test

@@ -15,27 +15,28 @@
 #include <gtest/gtest.h>
 #include <memory>
 
-namespace gewebe {
+namespace gewebe::test {
 namespace {
 
 /// By explicit steps, or by implicit ones that are solved.
-std::unique_ptr<BodyMotion> moving(const Model& model, bool implicit) {
+std::unique_ptr<dynamics::BodyMotion> moving(const model::Model& model, bool implicit) {
   if (!implicit)
-    return std::make_unique<Elastodynamic>(model);
-  SolidChoice exact;
+    return std::make_unique<dynamics::Elastodynamic>(model);
+  integrator::SolidChoice exact;
   exact.tolerance = 1e-9;
-  return std::make_unique<SolidDynamic>(model, exact, test::one_thread());
+  return std::make_unique<dynamics::SolidDynamic>(model, exact, test::one_thread());
 }
 
 using test::kicked, test::one_thread, test::organ, test::random_model, test::two_masses;
 
 TEST(SpringKernel, AgreesWithTheForceOfASpringAndIsTheSameOnEveryCpu) {
-  const Model model = build_model(test::ball(4, 20), {}, Context{}).model; // several blocks
-  const SpringLayout layout = spring_layout(model);
+  const model::Model model =
+      model::build_model(test::ball(4, 20), {}, Context{}).model; // several blocks
+  const dynamics::SpringLayout layout = dynamics::spring_layout(model);
   EXPECT_GT(layout.blocks.size(), 2U);
-  const std::vector<NodeMotion> motion = kicked(model, 1, 30);
-  std::vector<NodeRow> now(model.nodes.size()), next(now.size()), again(now.size());
-  std::vector<NodeTraits> traits(layout.movable);
+  const std::vector<dynamics::NodeMotion> motion = kicked(model, 1, 30);
+  std::vector<dynamics::NodeRow> now(model.nodes.size()), next(now.size()), again(now.size());
+  std::vector<dynamics::NodeTraits> traits(layout.movable);
   for (std::size_t row = 0; row < now.size(); ++row) {
     now[row] = {};
     for (int a = 0; a < 3; ++a) {
@@ -48,21 +49,22 @@ TEST(SpringKernel, AgreesWithTheForceOfASpringAndIsTheSameOnEveryCpu) {
     std::fill_n(traits[row].inverse_mass, 3, 1.0);
     traits[row].drag = model.nodes[layout.node_of_row[row]].drag;
   }
-  for (const SpringBlock& block : layout.blocks) {
-    EXPECT_TRUE(
-        block_step_baseline(block, layout.rest.data(), traits.data(), now.data(), next.data(), 1));
+  for (const dynamics::SpringBlock& block : layout.blocks) {
+    EXPECT_TRUE(dynamics::block_step_baseline(block, layout.rest.data(), traits.data(), now.data(),
+                                              next.data(), 1));
     if (best_cpu_level() != CpuLevel::baseline) {
-      EXPECT_TRUE(
-          block_step_avx2(block, layout.rest.data(), traits.data(), now.data(), again.data(), 1));
+      EXPECT_TRUE(dynamics::block_step_avx2(block, layout.rest.data(), traits.data(), now.data(),
+                                            again.data(), 1));
     }
   }
   if (best_cpu_level() != CpuLevel::baseline) {
-    EXPECT_EQ(0, std::memcmp(next.data(), again.data(), layout.movable * sizeof(NodeRow)));
+    EXPECT_EQ(0,
+              std::memcmp(next.data(), again.data(), layout.movable * sizeof(dynamics::NodeRow)));
   }
-  const SpringNetwork network = spring_network(model);
+  const dynamics::SpringNetwork network = dynamics::spring_network(model);
   double error = 0, scale = 0;
   for (std::size_t row = 0; row < layout.movable; ++row) {
-    const Vec3 force = spring_force(network, motion, layout.node_of_row[row]);
+    const Vec3 force = dynamics::spring_force(network, motion, layout.node_of_row[row]);
     const Vec3 gained{next[row].v[0] - now[row].v[0], next[row].v[1] - now[row].v[1],
                       next[row].v[2] - now[row].v[2]};
     error = test::larger(error, norm(gained - force));
@@ -72,51 +74,52 @@ TEST(SpringKernel, AgreesWithTheForceOfASpringAndIsTheSameOnEveryCpu) {
   EXPECT_LT(error, 1e-12 * scale);
   // It tells what is not finite, wherever.
   for (const std::size_t row : {std::size_t{0}, layout.movable - 1}) {
-    std::vector<NodeRow> odd = now;
+    std::vector<dynamics::NodeRow> odd = now;
     odd[row].v[2] = std::nan("");
     bool finite = true;
-    for (const SpringBlock& block : layout.blocks)
-      finite = block_step_baseline(block, layout.rest.data(), traits.data(), odd.data(),
-                                   next.data(), 1) &&
+    for (const dynamics::SpringBlock& block : layout.blocks)
+      finite = dynamics::block_step_baseline(block, layout.rest.data(), traits.data(), odd.data(),
+                                             next.data(), 1) &&
                finite;
     EXPECT_FALSE(finite);
   }
 }
 
 TEST(SpringLayout, HoldsEverySpringOnceOrOnceForEitherEnd) {
-  const Model model = organ(4);
-  const SpringLayout layout = spring_layout(model);
+  const model::Model model = organ(4);
+  const dynamics::SpringLayout layout = dynamics::spring_layout(model);
   std::size_t rows = 0, halves = 0;
-  for (const SpringBlock& block : layout.blocks) {
+  for (const dynamics::SpringBlock& block : layout.blocks) {
     EXPECT_EQ(block.first, rows);
     rows += block.count;
     for (const bool within : {true, false})
       for (std::size_t g = 0; g < (within ? block.within_count : block.across_count); ++g)
         for (std::size_t lane = 0; lane < 4; ++lane) {
-          const SpringGroup& group = within ? block.within[g] : block.across[g];
+          const dynamics::SpringGroup& group = within ? block.within[g] : block.across[g];
           if (group.i[lane] != group.j[lane])
             halves += within ? 2 : 1;
         }
   }
   EXPECT_EQ(rows, layout.movable);
   std::size_t expected = 0;
-  for (const Spring& s : model.springs)
-    expected += (model.nodes[s.i].fixed != fixed_all ? 1U : 0U) +
-                (model.nodes[s.j].fixed != fixed_all ? 1U : 0U);
+  for (const model::Spring& s : model.springs)
+    expected += (model.nodes[s.i].fixed != model::fixed_all ? 1U : 0U) +
+                (model.nodes[s.j].fixed != model::fixed_all ? 1U : 0U);
   EXPECT_EQ(halves, expected);
 }
 
 TEST(ElastodynamicPhysics, EnergyOfAnUndampedNetStaysInABoundOverAMillionSteps) {
-  BuildOptions options;
+  model::BuildOptions options;
   options.drag_rate = 0;
   options.material.materials[0].damping_ratio = 0;
-  const Model model = build_model(test::octahedron(), options, Context{}).model;
-  Elastodynamic object(model);
+  const model::Model model = model::build_model(test::octahedron(), options, Context{}).model;
+  dynamics::Elastodynamic object(model);
   object.set_motion(kicked(model, 0.02, 0));
   const auto energy = [&] {
-    return kinetic_energy(model, object.motion()) + elastic_energy(model, object.motion());
+    return dynamics::kinetic_energy(model, object.motion()) +
+           dynamics::elastic_energy(model, object.motion());
   };
-  const double first = energy(), h = 0.2 * safe_step(model);
+  const double first = energy(), h = 0.2 * model::safe_step(model);
   EXPECT_GT(first, 0);
   double worst = 0;
   for (int k = 0; k < 100; ++k) {
@@ -127,7 +130,7 @@ TEST(ElastodynamicPhysics, EnergyOfAnUndampedNetStaysInABoundOverAMillionSteps) 
 }
 
 /// The largest difference of the two over the largest displacement.
-double error_of_motion(std::span<const NodeMotion> motion, std::span<const double> u) {
+double error_of_motion(std::span<const dynamics::NodeMotion> motion, std::span<const double> u) {
   double error = 0, size = 0;
   for (std::size_t i = 0; i < motion.size(); ++i) {
     const Vec3 still{u[3 * i], u[3 * i + 1], u[3 * i + 2]};
@@ -138,22 +141,22 @@ double error_of_motion(std::span<const NodeMotion> motion, std::span<const doubl
 }
 
 TEST(ElastodynamicPhysics, ASmallForceEndsAtTheStaticSolution) {
-  const Model model = organ(2);
-  const StiffnessMatrix matrix = stiffness_matrix(model);
-  const Factor factor(matrix, Context{});
+  const model::Model model = organ(2);
+  const linalg::StiffnessMatrix matrix = fem::stiffness_matrix(model);
+  const linalg::Factor factor(matrix, Context{});
   std::vector<double> f(3 * model.nodes.size()), u(f.size());
   const std::uint32_t node = test::free_nodes(model)[7];
-  Load load;
+  contact::Load load;
   load.force[node] = {0.05, 0.1, -0.05};
   for (std::size_t a = 0; a < 3; ++a)
     f[3 * std::size_t{node} + a] = load.force[node][static_cast<int>(a)];
-  solve_axes(matrix, factor, f, u);
+  linalg::solve_axes(matrix, factor, f, u);
   // Half the difference of pulls to either side: what bends the answer is even in the force.
   const auto pulled = [&](bool implicit, double by) {
-    const double h = implicit ? 0.05 : 0.9 * safe_step(model);
-    std::vector<NodeMotion> half(model.nodes.size());
+    const double h = implicit ? 0.05 : 0.9 * model::safe_step(model);
+    std::vector<dynamics::NodeMotion> half(model.nodes.size());
     for (const double side : {1.0, -1.0}) {
-      Load pull;
+      contact::Load pull;
       pull.force[node] = side * by * load.force[node];
       const auto object = moving(model, implicit);
       object->set_load(pull, 0);
@@ -191,7 +194,7 @@ TriangleMesh strip(int columns, int rows) {
 /// How far a strip of Van Gelder's springs stretches under a force along y that would strain the
 /// plate by 1e-3, over that; inner points are moved by up to `disorder` along x and y first.
 double stretch(int columns, int rows, double disorder) {
-  BuildOptions options;
+  model::BuildOptions options;
   options.centrals = 0;
   TriangleMesh mesh = strip(columns, rows);
   const double height = rows * std::sqrt(3.0) / 2, width = columns, strain = 1e-3;
@@ -203,19 +206,19 @@ double stretch(int columns, int rows, double disorder) {
       p.x += shift(random);
       p.y += shift(random);
     }
-  Model model = build_model(mesh, options, Context{}).model;
-  for (Node& n : model.nodes)
-    n.fixed = n.position.y == 0 ? fixed_y | fixed_z : fixed_z;
-  model.nodes[static_cast<std::size_t>(columns) / 2].fixed = fixed_all;
-  const Material& m = model.materials[0];
+  model::Model model = model::build_model(mesh, options, Context{}).model;
+  for (model::Node& n : model.nodes)
+    n.fixed = n.position.y == 0 ? model::fixed_y | model::fixed_z : model::fixed_z;
+  model.nodes[static_cast<std::size_t>(columns) / 2].fixed = model::fixed_all;
+  const model::Material& m = model.materials[0];
   const double force = m.young * m.thickness * width * strain; // of the plate under this strain
-  const StiffnessMatrix matrix = stiffness_matrix(model);
-  const Factor factor(matrix, Context{});
+  const linalg::StiffnessMatrix matrix = fem::stiffness_matrix(model);
+  const linalg::Factor factor(matrix, Context{});
   std::vector<double> f(3 * model.nodes.size()), u(f.size());
   for (std::size_t i = 0; i < model.nodes.size(); ++i)
     if (model.nodes[i].position.y > height - 1e-9)
       f[3 * i + 1] = force / (columns + 1);
-  solve_axes(matrix, factor, f, u);
+  linalg::solve_axes(matrix, factor, f, u);
   // Means over two rows, far from the ends.
   const auto row = [&](int r, auto&& value) {
     double sum = 0;
@@ -248,19 +251,19 @@ TEST(ElastodynamicPhysics, IrregularNetsStretchByAnotherFactorHoweverFine) {
 }
 
 TEST(ElastodynamicLoad, APulseIsZeroAtWholePeriodsAndWholeBetween) {
-  EXPECT_EQ(pulse(0, 0.8), 0);
-  EXPECT_EQ(pulse(0.5, 1), 1);
-  EXPECT_NEAR(pulse(0.8 * 7, 0.8), 0, 1e-12);
-  EXPECT_EQ(pulse(3, 0), 1);
+  EXPECT_EQ(contact::pulse(0, 0.8), 0);
+  EXPECT_EQ(contact::pulse(0.5, 1), 1);
+  EXPECT_NEAR(contact::pulse(0.8 * 7, 0.8), 0, 1e-12);
+  EXPECT_EQ(contact::pulse(3, 0), 1);
   for (int n = 0; n < 300; ++n)
-    EXPECT_NEAR(pulse(0.01 * n, 1), (1 - std::cos(2 * M_PI * 0.01 * n)) / 2, 0.011);
+    EXPECT_NEAR(contact::pulse(0.01 * n, 1), (1 - std::cos(2 * M_PI * 0.01 * n)) / 2, 0.011);
 }
 
 TEST(ElastodynamicLoad, APulsingForceDrivesAMassAsItShould) {
   // A free mass under f pulse(t): its speed is the integral, f T / 2 a period.
-  Model model = two_masses(2, 0);
-  Elastodynamic object(model);
-  Load load;
+  model::Model model = two_masses(2, 0);
+  dynamics::Elastodynamic object(model);
+  contact::Load load;
   load.force[1] = {0, 6, 0};
   load.force_period[1] = 0.5;
   object.set_load(load);
@@ -272,10 +275,10 @@ TEST(ElastodynamicLoad, APulsingForceDrivesAMassAsItShould) {
 
 TEST(ElastodynamicLoad, ARampedNodeArrivesAndPullsTheOthers) {
   for (const bool implicit : {false, true}) {
-    const Model model = two_masses(1, 10, 0.5);
+    const model::Model model = two_masses(1, 10, 0.5);
     const auto mover = moving(model, implicit);
-    BodyMotion& object = *mover;
-    Load load;
+    dynamics::BodyMotion& object = *mover;
+    contact::Load load;
     load.displacement[0] = {-0.5, 0, 0};
     load.ramp[0] = {{}, {-0.5, 0, 0}, 0.25, 1.25};
     object.set_load(load, 0);
@@ -292,23 +295,23 @@ TEST(ElastodynamicLoad, ARampedNodeArrivesAndPullsTheOthers) {
 }
 
 TEST(ElastodynamicLoad, PressureOnAClosedSurfaceMovesNothingAsAWholeAndFollowsTheShape) {
-  Model model = organ(2);
-  for (Node& n : model.nodes) {
-    n.fixed = fixed_none;
+  model::Model model = organ(2);
+  for (model::Node& n : model.nodes) {
+    n.fixed = model::fixed_none;
     n.drag = 0;
   }
-  Elastodynamic object(model);
-  Load load;
-  for (std::uint32_t i = 0; i < surface_count(model); ++i)
+  dynamics::Elastodynamic object(model);
+  contact::Load load;
+  for (std::uint32_t i = 0; i < model::surface_count(model); ++i)
     load.pressure[i] = {50, 0};
   object.set_load(load);
-  (void)object.advance(200 * safe_step(model), 0.9 * safe_step(model), one_thread());
-  const Vec3 moved = momentum(model, object.motion());
+  (void)object.advance(200 * model::safe_step(model), 0.9 * model::safe_step(model), one_thread());
+  const Vec3 moved = dynamics::momentum(model, object.motion());
   double scale = 0, outward = 0;
   Vec3 middle;
-  for (std::size_t i = 0; i < surface_count(model); ++i)
-    middle += model.nodes[i].position / static_cast<double>(surface_count(model));
-  for (std::size_t i = 0; i < surface_count(model); ++i) {
+  for (std::size_t i = 0; i < model::surface_count(model); ++i)
+    middle += model.nodes[i].position / static_cast<double>(model::surface_count(model));
+  for (std::size_t i = 0; i < model::surface_count(model); ++i) {
     scale += model.nodes[i].mass * norm(object.motion()[i].velocity);
     outward += dot(object.motion()[i].displacement, model.nodes[i].position - middle);
   }
@@ -316,7 +319,7 @@ TEST(ElastodynamicLoad, PressureOnAClosedSurfaceMovesNothingAsAWholeAndFollowsTh
   EXPECT_LT(norm(moved), 1e-9 * scale);
   EXPECT_GT(outward, 0); // it swells
   // At rest the forces are those of load_at().
-  const Load still = load_at(load, model, 0);
+  const contact::Load still = contact::load_at(load, model, 0);
   Vec3 sum;
   for (const auto& [node, force] : still.force)
     sum += force;
@@ -324,18 +327,18 @@ TEST(ElastodynamicLoad, PressureOnAClosedSurfaceMovesNothingAsAWholeAndFollowsTh
 }
 
 TEST(ElastodynamicLoad, TheFirstNodeThatIsNotFiniteIsNamedWithItsTime) {
-  const Model model = organ(1);
+  const model::Model model = organ(1);
   const std::uint32_t node = test::free_nodes(model)[3];
   for (const bool implicit : {false, true}) {
     const auto mover = moving(model, implicit);
-    BodyMotion& object = *mover;
-    Load load;
+    dynamics::BodyMotion& object = *mover;
+    contact::Load load;
     load.force[node] = {1e308, 1e308, 0};
     object.set_load(load, 0);
     try {
       (void)object.advance(1, 0.001, one_thread(), 2);
       ADD_FAILURE() << "no error";
-    } catch (const MotionError& error) {
+    } catch (const dynamics::MotionError& error) {
       EXPECT_GT(error.time(), 2);
       EXPECT_LE(error.time(), 2.1);
       if (!implicit) {
@@ -348,21 +351,22 @@ TEST(ElastodynamicLoad, TheFirstNodeThatIsNotFiniteIsNamedWithItsTime) {
 TEST(ElastodynamicStability, BelowTheBoundEnergyStaysBoundedAndFarAboveItIsReported) {
   int exploded = 0;
   for (std::uint32_t seed = 0; seed < 16; ++seed) {
-    const Model model = random_model(seed);
-    const std::vector<NodeMotion> start = kicked(model, 1e-7, 0);
+    const model::Model model = random_model(seed);
+    const std::vector<dynamics::NodeMotion> start = kicked(model, 1e-7, 0);
     for (const double part : {0.99, 4.0}) {
-      Elastodynamic object(model);
+      dynamics::Elastodynamic object(model);
       object.set_motion(start);
-      const double energy = elastic_energy(model, object.motion()), h = part * safe_step(model);
+      const double energy = dynamics::elastic_energy(model, object.motion()),
+                   h = part * model::safe_step(model);
       try {
         (void)object.advance(3000 * h, h, one_thread());
-      } catch (const MotionError&) {
+      } catch (const dynamics::MotionError&) {
         EXPECT_GT(part, 1) << seed;
         ++exploded;
         continue;
       }
-      const double now =
-          kinetic_energy(model, object.motion()) + elastic_energy(model, object.motion());
+      const double now = dynamics::kinetic_energy(model, object.motion()) +
+                         dynamics::elastic_energy(model, object.motion());
       if (part < 1) {
         EXPECT_LE(now, 200 * energy) << seed; // near the bound the conserved quantity is not E
       } else if (!(now <= 200 * energy)) {
@@ -374,4 +378,4 @@ TEST(ElastodynamicStability, BelowTheBoundEnergyStaysBoundedAndFarAboveItIsRepor
 }
 
 } // namespace
-} // namespace gewebe
+} // namespace gewebe::test

@@ -18,7 +18,7 @@
 #include <random>
 #include <utility>
 
-namespace gewebe {
+namespace gewebe::test {
 namespace {
 
 using test::free_nodes, test::organ;
@@ -26,10 +26,10 @@ using test::free_nodes, test::organ;
 using Vector = Eigen::VectorXd;
 
 /// K over all axes, from its definition alone.
-Eigen::MatrixXd dense_stiffness(const Model& model) {
+Eigen::MatrixXd dense_stiffness(const model::Model& model) {
   const auto size = static_cast<Eigen::Index>(3 * model.nodes.size());
   Eigen::MatrixXd k = Eigen::MatrixXd::Zero(size, size);
-  for (const Spring& s : model.springs) {
+  for (const model::Spring& s : model.springs) {
     const Vec3 along = model.nodes[s.j].position - model.nodes[s.i].position;
     const Eigen::Vector3d d(along.x, along.y, along.z), n = d.normalized();
     const Eigen::Matrix3d block =
@@ -45,7 +45,7 @@ Eigen::MatrixXd dense_stiffness(const Model& model) {
 }
 
 /// Displacements under a load by dense LU: prescribed axes and fixed ones are held.
-Vector dense_shape(const Model& model, const Load& load) {
+Vector dense_shape(const model::Model& model, const contact::Load& load) {
   const Eigen::MatrixXd k = dense_stiffness(model);
   const Eigen::Index size = k.rows();
   Vector u = Vector::Zero(size), f = Vector::Zero(size);
@@ -58,7 +58,7 @@ Vector dense_shape(const Model& model, const Load& load) {
         f[axis] += load.force.at(i)[a];
       if (load.displacement.contains(i))
         u[axis] = load.displacement.at(i)[a];
-      else if (!is_fixed(model, i, a))
+      else if (!contact::is_fixed(model, i, a))
         free.push_back(axis);
     }
   const Vector rhs = (f - k * u)(free);
@@ -69,11 +69,11 @@ Vector dense_shape(const Model& model, const Load& load) {
   return u;
 }
 
-double cond(const Model& model) {
+double cond(const model::Model& model) {
   std::vector<Eigen::Index> free;
   for (std::size_t i = 0; i < model.nodes.size(); ++i)
     for (int a = 0; a < 3; ++a)
-      if (!is_fixed(model, i, a))
+      if (!contact::is_fixed(model, i, a))
         free.push_back(static_cast<Eigen::Index>(3 * i) + a);
   const Eigen::MatrixXd k = dense_stiffness(model)(free, free);
   const Vector values = k.selfadjointView<Eigen::Lower>().eigenvalues();
@@ -92,18 +92,19 @@ double relative_difference(const Vector& a, const Vector& b) {
 }
 
 /// Columns in memory, of some nodes.
-class Columns final : public ColumnSource {
+class Columns final : public columns::ColumnSource {
 public:
-  Columns(const Model& model, std::vector<std::uint32_t> nodes) : nodes_(std::move(nodes)) {
+  Columns(const model::Model& model, std::vector<std::uint32_t> nodes) : nodes_(std::move(nodes)) {
     count_ = model.nodes.size();
-    const StiffnessMatrix matrix = stiffness_matrix(model);
-    const Factor factor(matrix, Context{});
+    const linalg::StiffnessMatrix matrix = fem::stiffness_matrix(model);
+    const linalg::Factor factor(matrix, Context{});
     for (const std::uint32_t node : nodes_) {
       std::vector<double>& column = columns_.emplace_back(9 * count_);
       for (std::size_t a = 0; a < 3; ++a) {
         std::vector<double> f(3 * count_);
         f[3 * node + a] = 1;
-        solve_axes(matrix, factor, f, std::span(column).subspan(a * 3 * count_, 3 * count_));
+        linalg::solve_axes(matrix, factor, f,
+                           std::span(column).subspan(a * 3 * count_, 3 * count_));
       }
     }
   }
@@ -122,26 +123,27 @@ private:
 };
 
 /// The factor may be asked for only where `factor_asked` is given.
-std::shared_ptr<ComplianceSource> with_columns(const Model& model, std::vector<std::uint32_t> nodes,
-                                               int* factor_asked = nullptr) {
-  return compliance_of_store(
+std::shared_ptr<compliance::ComplianceSource> with_columns(const model::Model& model,
+                                                           std::vector<std::uint32_t> nodes,
+                                                           int* factor_asked = nullptr) {
+  return compliance::compliance_of_store(
       {std::make_unique<Columns>(model, std::move(nodes)), [&model, factor_asked] {
          if (factor_asked == nullptr)
            throw Error("nobody should need the factor");
          ++*factor_asked;
-         return Factor(stiffness_matrix(model), Context{});
+         return linalg::Factor(fem::stiffness_matrix(model), Context{});
        }});
 }
 
-Elastostatic plain(const Model& model, std::size_t block_limit = SIZE_MAX) {
+statics::Elastostatic plain(const model::Model& model, std::size_t block_limit = SIZE_MAX) {
   return {model, {}, Context{}, {.measure_error = true, .block_limit = block_limit}};
 }
 
 /// Forces, displacements and gravity at several nodes.
-Load rich_load(const Model& model, std::size_t displaced) {
+contact::Load rich_load(const model::Model& model, std::size_t displaced) {
   const std::vector<std::uint32_t> nodes = free_nodes(model);
   EXPECT_GT(nodes.size(), displaced + 6);
-  Load load{.gravity = {1000, 0, -9810}};
+  contact::Load load{.gravity = {1000, 0, -9810}};
   for (std::size_t k = 0; k < displaced; ++k)
     load.displacement[nodes[3 * k % nodes.size()]] = {0.01 * static_cast<double>(k), -0.02, 0.03};
   load.force[nodes[1]] = {10, -20, 30};
@@ -149,7 +151,7 @@ Load rich_load(const Model& model, std::size_t displaced) {
   load.force[nodes[0]] = {7, 7, 7}; // a displaced node, if there is one
   // A node that is held along z alone can be displaced along x and y.
   for (std::uint32_t i = 0; displaced > 0 && i < model.nodes.size(); ++i)
-    if (model.nodes[i].fixed == fixed_z) {
+    if (model.nodes[i].fixed == model::fixed_z) {
       load.displacement[i] = {0.05, 0.01, 0};
       break;
     }
@@ -157,11 +159,11 @@ Load rich_load(const Model& model, std::size_t displaced) {
 }
 
 TEST(Elastostatic, ShapeOfForcesAndGravityEqualsADenseSolve) {
-  const Model model = organ();
+  const model::Model model = organ();
   const double tolerance = 10 * 2.2e-16 * cond(model);
   EXPECT_LT(tolerance, 1e-9);
-  Elastostatic object = plain(model);
-  const Load load = rich_load(model, 0);
+  statics::Elastostatic object = plain(model);
+  const contact::Load load = rich_load(model, 0);
   object.update(load);
   const Vector expected = dense_shape(model, load);
   EXPECT_GT(expected.cwiseAbs().maxCoeff(), 0.01);
@@ -169,21 +171,21 @@ TEST(Elastostatic, ShapeOfForcesAndGravityEqualsADenseSolve) {
   EXPECT_LT(object.counts().backward_error, 1e-14);
   EXPECT_GT(object.counts().backward_error, 0);
   // The comparison can fail: stiffer springs give another shape.
-  Model other = model;
-  for (Spring& s : other.springs)
+  model::Model other = model;
+  for (model::Spring& s : other.springs)
     s.stiffness *= s.i == free_nodes(model)[0] ? 1.001 : 1;
   EXPECT_GT(relative_difference(as_vector(object.displacement()), dense_shape(other, load)),
             tolerance);
 }
 
 TEST(Elastostatic, BothWaysOfContactEqualADenseSolve) {
-  const Model model = organ();
+  const model::Model model = organ();
   const double tolerance = 10 * 2.2e-16 * cond(model);
   for (const std::size_t m : {1U, 3U, 10U}) {
-    const Load load = rich_load(model, m);
+    const contact::Load load = rich_load(model, m);
     const Vector expected = dense_shape(model, load);
-    Elastostatic block = plain(model, SIZE_MAX - 1), constrained = plain(model, 0);
-    for (Elastostatic* object : {&block, &constrained}) {
+    statics::Elastostatic block = plain(model, SIZE_MAX - 1), constrained = plain(model, 0);
+    for (statics::Elastostatic* object : {&block, &constrained}) {
       object->update(load);
       EXPECT_LT(relative_difference(as_vector(object->displacement()), expected), tolerance) << m;
       EXPECT_LT(object->counts().backward_error, 1e-14);
@@ -195,10 +197,11 @@ TEST(Elastostatic, BothWaysOfContactEqualADenseSolve) {
     EXPECT_EQ(constrained.counts().factors, 2U);
     ASSERT_EQ(block.contact_forces().size(), load.displacement.size());
     double scale = 0;
-    for (const NodeVector& f : block.contact_forces())
+    for (const contact::NodeVector& f : block.contact_forces())
       scale = test::larger(scale, norm(f.value));
     for (std::size_t k = 0; k < block.contact_forces().size(); ++k) {
-      const NodeVector &a = block.contact_forces()[k], &b = constrained.contact_forces()[k];
+      const contact::NodeVector &a = block.contact_forces()[k],
+                                &b = constrained.contact_forces()[k];
       EXPECT_EQ(a.node, b.node);
       EXPECT_LT(norm(a.value - b.value), tolerance * scale);
     }
@@ -206,13 +209,13 @@ TEST(Elastostatic, BothWaysOfContactEqualADenseSolve) {
 }
 
 TEST(Elastostatic, ForcesAndReactionsBalance) {
-  const Model model = organ();
+  const model::Model model = organ();
   for (const std::size_t limit : {std::size_t{0}, SIZE_MAX}) {
-    Elastostatic object = plain(model, limit);
-    const Load load = rich_load(model, 5);
+    statics::Elastostatic object = plain(model, limit);
+    const contact::Load load = rich_load(model, 5);
     object.update(load);
     std::vector<double> product(3 * model.nodes.size());
-    multiply_stiffness(model, object.displacement(), product);
+    fem::multiply_stiffness(model, object.displacement(), product);
     Vec3 sum, turn;
     double scale = 0;
     const auto acts = [&](std::size_t i, const Vec3& f) {
@@ -220,14 +223,14 @@ TEST(Elastostatic, ForcesAndReactionsBalance) {
       turn += cross(model.nodes[i].position, f); // moments about rest: the object is linearised
       scale += norm(f);
     };
-    for (const NodeVector& c : object.contact_forces())
+    for (const contact::NodeVector& c : object.contact_forces())
       acts(c.node, c.value);
     for (std::uint32_t i = 0; i < model.nodes.size(); ++i) {
       Vec3 outer = model.nodes[i].mass * load.gravity, reaction;
       if (load.force.contains(i))
         outer += load.force.at(i);
       for (int a = 0; a < 3; ++a)
-        if (is_fixed(model, i, a))
+        if (contact::is_fixed(model, i, a))
           reaction[a] = product[3 * i + static_cast<std::size_t>(a)] - outer[a];
       acts(i, outer + reaction);
     }
@@ -235,21 +238,21 @@ TEST(Elastostatic, ForcesAndReactionsBalance) {
     EXPECT_LT(norm(sum), 1e-12 * scale);
     EXPECT_LT(norm(turn), 1e-12 * scale * 200);
     // Without the contact forces it does not balance.
-    for (const NodeVector& c : object.contact_forces())
+    for (const contact::NodeVector& c : object.contact_forces())
       sum -= c.value;
     EXPECT_GT(norm(sum), 1e-3 * scale);
   }
 }
 
 TEST(Elastostatic, ShapesOfForcesAddUp) {
-  const Model model = organ();
+  const model::Model model = organ();
   const std::vector<std::uint32_t> nodes = free_nodes(model);
-  const auto shape = [&](const Load& load) {
-    Elastostatic object = plain(model);
+  const auto shape = [&](const contact::Load& load) {
+    statics::Elastostatic object = plain(model);
     object.update(load);
     return as_vector(object.displacement()).eval();
   };
-  Load a, b, both;
+  contact::Load a, b, both;
   a.force[nodes[2]] = {30, 0, 10};
   b.force[nodes[2]] = {0, 5, 0};
   b.force[nodes[8]] = {1, 2, 3};
@@ -269,16 +272,16 @@ TEST(Elastostatic, ShapesOfForcesAddUp) {
   EXPECT_LT(relative_difference(shape(a) + shape(b), shape(both)), 1e-11);
 }
 
-void shape_of(Elastostatic& object, const Load& load) {
+void shape_of(statics::Elastostatic& object, const contact::Load& load) {
   object.update(load);
   (void)object.displacement();
 }
 
 TEST(Elastostatic, OnlyWhatChangedIsComputed) {
-  const Model model = organ();
+  const model::Model model = organ();
   const std::vector<std::uint32_t> nodes = free_nodes(model);
-  Elastostatic object(model, {}, Context{});
-  Load load;
+  statics::Elastostatic object(model, {}, Context{});
+  contact::Load load;
   shape_of(object, load);
   EXPECT_EQ(object.counts().unchanged, 1U);
   EXPECT_EQ(object.counts().solves, 0U);
@@ -308,7 +311,7 @@ TEST(Elastostatic, OnlyWhatChangedIsComputed) {
     EXPECT_EQ(value, 0);
   EXPECT_TRUE(object.contact_forces().empty());
 
-  Elastostatic held(model, {}, Context{}, {.block_limit = 0});
+  statics::Elastostatic held(model, {}, Context{}, {.block_limit = 0});
   load.displacement[nodes[1]] = {0.1, 0, 0};
   shape_of(held, load);
   load.displacement[nodes[1]] = {0.1, 0, 0.1};
@@ -320,23 +323,23 @@ TEST(Elastostatic, OnlyWhatChangedIsComputed) {
 }
 
 TEST(Elastostatic, AHistoryGivesTheSameBytesAndALoadTheSameShape) {
-  const Model model = organ();
+  const model::Model model = organ();
   const double tolerance = 10 * 2.2e-16 * cond(model);
-  const Load load = rich_load(model, 4), other = rich_load(model, 2);
+  const contact::Load load = rich_load(model, 4), other = rich_load(model, 2);
   for (const std::size_t limit : {std::size_t{0}, SIZE_MAX}) {
-    Elastostatic fresh(model, {}, Context{}, {.block_limit = limit});
+    statics::Elastostatic fresh(model, {}, Context{}, {.block_limit = limit});
     fresh.update(load);
     const auto with_history = [&](int threads) {
       Context context;
       context.threads = threads;
-      Elastostatic used(model, {}, context, {.block_limit = limit});
+      statics::Elastostatic used(model, {}, context, {.block_limit = limit});
       used.update(other);
       (void)used.displacement();
       used.update({});
       used.update(load);
       return used;
     };
-    Elastostatic first = with_history(1), second = with_history(2);
+    statics::Elastostatic first = with_history(1), second = with_history(2);
     EXPECT_TRUE(std::ranges::equal(first.displacement(), second.displacement()));
     EXPECT_EQ(first.contact_forces(), second.contact_forces());
     EXPECT_LT(relative_difference(as_vector(first.displacement()), as_vector(fresh.displacement())),
@@ -345,11 +348,11 @@ TEST(Elastostatic, AHistoryGivesTheSameBytesAndALoadTheSameShape) {
 }
 
 TEST(Elastostatic, StoredColumnsNeedNoFactor) {
-  const Model model = organ();
+  const model::Model model = organ();
   const std::vector<std::uint32_t> nodes = free_nodes(model);
   const std::vector<std::uint32_t> some(nodes.begin(), nodes.begin() + 6);
-  Elastostatic object(model, with_columns(model, some), Context{});
-  Load load;
+  statics::Elastostatic object(model, with_columns(model, some), Context{});
+  contact::Load load;
   load.force[nodes[1]] = {10, -20, 30};
   load.displacement[nodes[0]] = {0.1, 0.2, 0.3};
   load.displacement[nodes[5]] = {0, 0, -0.1};
@@ -366,7 +369,7 @@ TEST(Elastostatic, StoredColumnsNeedNoFactor) {
   load.force[nodes[7]] = {1, 2, 3};
   EXPECT_THROW(object.update(load), Error);
   int asked = 0;
-  Elastostatic both(model, with_columns(model, some, &asked), Context{});
+  statics::Elastostatic both(model, with_columns(model, some, &asked), Context{});
   EXPECT_EQ(asked, 0);
   both.update(load);
   EXPECT_EQ(asked, 1);
@@ -375,14 +378,14 @@ TEST(Elastostatic, StoredColumnsNeedNoFactor) {
 }
 
 TEST(Elastostatic, LittleMemoryKeepsFewColumns) {
-  const Model model = organ();
+  const model::Model model = organ();
   const std::vector<std::uint32_t> nodes = free_nodes(model);
   Context context;
   context.max_memory = 4 * 72 * model.nodes.size() * 2; // two nodes' columns
   int asked = 0;
-  Elastostatic object(model, with_columns(model, nodes, &asked), context);
+  statics::Elastostatic object(model, with_columns(model, nodes, &asked), context);
   for (std::size_t k = 0; k + 1 < nodes.size(); ++k) {
-    Load load;
+    contact::Load load;
     load.force[nodes[k]] = load.force[nodes[k + 1]] = {1, 2, 3};
     shape_of(object, load);
     if (k == 9) {
@@ -395,12 +398,12 @@ TEST(Elastostatic, LittleMemoryKeepsFewColumns) {
 }
 
 TEST(Elastostatic, ARigidGraspAsksWithinTwelveDimensions) {
-  const Model model = organ();
+  const model::Model model = organ();
   const std::vector<std::uint32_t> nodes = free_nodes(model);
   const double tolerance = 40 * 2.2e-16 * cond(model); // shapes are sums of shapes
   const std::size_t m = 20;
   for (const std::size_t limit : {std::size_t{0}, SIZE_MAX - 1}) {
-    Elastostatic object(model, {}, Context{}, {.block_limit = limit});
+    statics::Elastostatic object(model, {}, Context{}, {.block_limit = limit});
     std::mt19937 random(5);
     std::uniform_real_distribution<double> some(-1, 1);
     const auto pose = [&](double warp) {
@@ -409,7 +412,7 @@ TEST(Elastostatic, ARigidGraspAsksWithinTwelveDimensions) {
                             Eigen::Vector3d(some(random), some(random), some(random)).normalized())
               .toRotationMatrix();
       const Eigen::Vector3d shift(some(random), some(random), some(random));
-      Load load{.gravity = {0, 0, -9810}};
+      contact::Load load{.gravity = {0, 0, -9810}};
       for (std::size_t k = 0; k < m; ++k) {
         const Vec3& p = model.nodes[nodes[k]].position;
         const Eigen::Vector3d x(p.x, p.y, p.z),
@@ -422,7 +425,7 @@ TEST(Elastostatic, ARigidGraspAsksWithinTwelveDimensions) {
       shape_of(object, pose(0));
     const std::uint64_t solves = object.counts().solves;
     for (int k = 0; k < 20; ++k) {
-      const Load load = pose(0);
+      const contact::Load load = pose(0);
       shape_of(object, load);
       if (k % 7 == 0) {
         EXPECT_LT(relative_difference(as_vector(object.displacement()), dense_shape(model, load)),
@@ -432,7 +435,7 @@ TEST(Elastostatic, ARigidGraspAsksWithinTwelveDimensions) {
     EXPECT_EQ(object.counts().solves, solves);
     // One that bends asks for more, and is as exact.
     for (int k = 0; k < 4; ++k) {
-      const Load load = pose(0.1);
+      const contact::Load load = pose(0.1);
       shape_of(object, load);
       EXPECT_LT(relative_difference(as_vector(object.displacement()), dense_shape(model, load)),
                 tolerance);
@@ -444,17 +447,17 @@ TEST(Elastostatic, ARigidGraspAsksWithinTwelveDimensions) {
 }
 
 TEST(Elastostatic, DelassusOperatorIsWhatForcesDo) {
-  const Model model = organ();
+  const model::Model model = organ();
   const std::vector<std::uint32_t> nodes = free_nodes(model);
   const double tolerance = 10 * 2.2e-16 * cond(model);
   const std::vector<std::uint32_t> touched{nodes[7], nodes[9], nodes[10], nodes[31]};
   for (const std::size_t limit : {std::size_t{0}, SIZE_MAX - 1})
     for (const std::size_t displaced : {0U, 5U}) {
-      Elastostatic object(model, {}, Context{}, {.block_limit = limit});
-      Load load = rich_load(model, displaced);
+      statics::Elastostatic object(model, {}, Context{}, {.block_limit = limit});
+      contact::Load load = rich_load(model, displaced);
       for (const std::uint32_t node : touched)
         load.displacement.erase(node);
-      const DelassusOperator delassus = object.delassus_operator(load, touched);
+      const statics::DelassusOperator delassus = object.delassus_operator(load, touched);
       ASSERT_EQ(delassus.free.size(), 12U);
       ASSERT_EQ(delassus.compliance.size(), 144U);
       Eigen::VectorXd f(12);
@@ -484,12 +487,12 @@ TEST(Elastostatic, DelassusOperatorIsWhatForcesDo) {
 }
 
 TEST(Elastostatic, NodesJoinAndLeaveTheBlock) {
-  const Model model = organ();
+  const model::Model model = organ();
   const std::vector<std::uint32_t> nodes = free_nodes(model);
   const double tolerance = 10 * 2.2e-16 * cond(model);
-  Elastostatic object(model, with_columns(model, nodes), Context{});
+  statics::Elastostatic object(model, with_columns(model, nodes), Context{});
   std::mt19937 random(7);
-  Load load;
+  contact::Load load;
   for (int k = 0; k < 60; ++k) {
     const std::uint32_t node = nodes[random() % nodes.size()];
     if (load.displacement.contains(node))
@@ -508,17 +511,17 @@ TEST(Elastostatic, NodesJoinAndLeaveTheBlock) {
 }
 
 TEST(Elastostatic, WhatTheToleranceLeavesOutStaysBelowIt) {
-  const Model model = organ(3);
+  const model::Model model = organ(3);
   const std::vector<std::uint32_t> nodes = free_nodes(model);
   std::mt19937 random(11);
   std::normal_distribution<double> normal;
   for (const double tolerance : {1e-1, 1e-2, 1e-3}) {
-    Elastostatic exact(model, with_columns(model, nodes), Context{}),
+    statics::Elastostatic exact(model, with_columns(model, nodes), Context{}),
         loose(model, with_columns(model, nodes), Context{},
               {.measure_error = true, .tolerance = tolerance});
     double worst = 0;
     for (int round = 0; round < 100; ++round) {
-      Load load;
+      contact::Load load;
       for (int k = 0; k < 1 + round % 12; ++k) {
         const std::uint32_t node = nodes[random() % nodes.size()];
         const Vec3 value{normal(random), normal(random), normal(random)};
@@ -539,18 +542,18 @@ TEST(Elastostatic, WhatTheToleranceLeavesOutStaysBelowIt) {
 }
 
 TEST(Elastostatic, TheToleranceAndMeasuringChangeNoBitOfForcesAndExactShapes) {
-  const Model model = organ(3);
+  const model::Model model = organ(3);
   const std::vector<std::uint32_t> nodes = free_nodes(model);
   std::mt19937 random(12);
   std::normal_distribution<double> normal;
   const std::vector<std::uint32_t> some(nodes.begin(), nodes.begin() + std::ssize(nodes) / 2);
   int factors = 0;
-  const auto made = [&](const ElastostaticOptions& options) {
-    return Elastostatic(model, with_columns(model, some, &factors), Context{}, options);
+  const auto made = [&](const statics::ElastostaticOptions& options) {
+    return statics::Elastostatic(model, with_columns(model, some, &factors), Context{}, options);
   };
-  Elastostatic exact = made({}), loose = made({.tolerance = 0.05}),
-               measured = made({.measure_error = true, .tolerance = 0.05});
-  Load load;
+  statics::Elastostatic exact = made({}), loose = made({.tolerance = 0.05}),
+                        measured = made({.measure_error = true, .tolerance = 0.05});
+  contact::Load load;
   for (int round = 0; round < 300; ++round) {
     if (round % 17 == 0)
       load.displacement.clear();
@@ -562,15 +565,15 @@ TEST(Elastostatic, TheToleranceAndMeasuringChangeNoBitOfForcesAndExactShapes) {
       (round % 3 == 0 ? load.force : load.displacement)[node] = value;
     }
     const bool asked = random() % 2 == 0, needed = random() % 2 == 0;
-    for (Elastostatic* const object : {&exact, &loose, &measured}) {
+    for (statics::Elastostatic* const object : {&exact, &loose, &measured}) {
       object->update(load);
       if (asked)
         (void)object->rough_surface();
       if (object == &measured)
         object->verify();
     }
-    for (Elastostatic* const object : {&loose, &measured}) {
-      const auto same = [](const NodeVector& a, const NodeVector& b) {
+    for (statics::Elastostatic* const object : {&loose, &measured}) {
+      const auto same = [](const contact::NodeVector& a, const contact::NodeVector& b) {
         return a.node == b.node && a.value == b.value;
       };
       ASSERT_TRUE(std::ranges::equal(exact.contact_forces(), object->contact_forces(), same))
@@ -586,11 +589,11 @@ TEST(Elastostatic, TheToleranceAndMeasuringChangeNoBitOfForcesAndExactShapes) {
 }
 
 TEST(Elastostatic, SumsThatFollowTheirChangesStayExact) {
-  const Model model = organ();
+  const model::Model model = organ();
   const std::vector<std::uint32_t> nodes = free_nodes(model);
-  Elastostatic object(model, with_columns(model, nodes), Context{}),
+  statics::Elastostatic object(model, with_columns(model, nodes), Context{}),
       fresh(model, with_columns(model, nodes), Context{});
-  Load load;
+  contact::Load load;
   for (std::size_t k = 0; k < 10; ++k)
     load.force[nodes[k]] = {1, 2, 3};
   shape_of(object, load);
@@ -607,41 +610,41 @@ TEST(Elastostatic, SumsThatFollowTheirChangesStayExact) {
 }
 
 TEST(Elastostatic, AllNodesDisplaced) {
-  const Model model = organ(1);
-  Load load;
+  const model::Model model = organ(1);
+  contact::Load load;
   for (std::uint32_t i = 0; i < model.nodes.size(); ++i)
-    if (model.nodes[i].fixed == fixed_none)
+    if (model.nodes[i].fixed == model::fixed_none)
       load.displacement[i] = {0.01 * i, 0, 0};
-    else if (model.nodes[i].fixed != fixed_all)
+    else if (model.nodes[i].fixed != model::fixed_all)
       load.displacement[i] = {};
   for (const std::size_t limit : {std::size_t{0}, SIZE_MAX}) {
-    Elastostatic object(model, {}, Context{}, {.block_limit = limit});
+    statics::Elastostatic object(model, {}, Context{}, {.block_limit = limit});
     object.update(load);
     for (const auto& [node, d] : load.displacement)
       EXPECT_EQ(object.displacement()[3 * node], d.x);
     std::vector<double> product(3 * model.nodes.size());
-    multiply_stiffness(model, object.displacement(), product);
-    for (const NodeVector& f : object.contact_forces())
-      EXPECT_NEAR(f.value.x, is_fixed(model, f.node, 0) ? 0 : product[3 * f.node], 1e-6);
+    fem::multiply_stiffness(model, object.displacement(), product);
+    for (const contact::NodeVector& f : object.contact_forces())
+      EXPECT_NEAR(f.value.x, contact::is_fixed(model, f.node, 0) ? 0 : product[3 * f.node], 1e-6);
   }
 }
 
 TEST(Elastostatic, IsTheLimitOfElastodynamicsForSmallForces) {
-  const Model model = organ();
+  const model::Model model = organ();
   const std::vector<std::uint32_t> nodes = free_nodes(model);
   Context one;
   one.threads = 1;
   std::vector<double> differences;
   for (const double part : {1.0, 0.1, 0.01}) {
-    Load load;
+    contact::Load load;
     for (std::size_t k = 0; k < 5; ++k)
       load.force[nodes[7 * k]] = {1000 * part, -500 * part, 1500 * part};
-    Elastostatic still(model, {}, Context{});
+    statics::Elastostatic still(model, {}, Context{});
     still.update(load);
-    Elastodynamic moving(model);
+    dynamics::Elastodynamic moving(model);
     moving.set_load(load);
     for (int k = 0; k < 400 && !moving.resting(); ++k)
-      (void)moving.advance(0.25, 0.9 * safe_step(model), one);
+      (void)moving.advance(0.25, 0.9 * model::safe_step(model), one);
     ASSERT_TRUE(moving.resting());
     Vector u(static_cast<Eigen::Index>(3 * model.nodes.size()));
     for (std::size_t i = 0; i < model.nodes.size(); ++i)
@@ -655,13 +658,13 @@ TEST(Elastostatic, IsTheLimitOfElastodynamicsForSmallForces) {
 }
 
 TEST(Elastostatic, RefusesASingularModelAndAnEndlessShape) {
-  Model loose = organ();
-  for (Node& n : loose.nodes)
-    n.fixed = fixed_none;
-  EXPECT_THROW(Elastostatic(loose, {}, Context{}), Error);
-  const Model model = organ();
-  Elastostatic object(model, {}, Context{});
-  Load load;
+  model::Model loose = organ();
+  for (model::Node& n : loose.nodes)
+    n.fixed = model::fixed_none;
+  EXPECT_THROW(statics::Elastostatic(loose, {}, Context{}), Error);
+  const model::Model model = organ();
+  statics::Elastostatic object(model, {}, Context{});
+  contact::Load load;
   load.force[free_nodes(model)[0]] = {1e308, 1e308, 1e308};
   load.gravity = {1e308, 1e308, 1e308};
   object.update(load);
@@ -669,9 +672,9 @@ TEST(Elastostatic, RefusesASingularModelAndAnEndlessShape) {
 }
 
 TEST(LinearRangeOf, StrainAndTurn) {
-  const Model model = test::two_masses();
+  const model::Model model = test::two_masses();
   const auto range = [&](const Vec3& u) {
-    return linear_range(model, std::vector<double>{0, 0, 0, u.x, u.y, u.z});
+    return statics::linear_range(model, std::vector<double>{0, 0, 0, u.x, u.y, u.z});
   };
   EXPECT_EQ(range({}).strain, 0);
   EXPECT_DOUBLE_EQ(range({0.5, 0, 0}).strain, 0.25);
@@ -682,4 +685,4 @@ TEST(LinearRangeOf, StrainAndTurn) {
 }
 
 } // namespace
-} // namespace gewebe
+} // namespace gewebe::test

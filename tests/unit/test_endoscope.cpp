@@ -16,35 +16,35 @@
 #include <cstdlib>
 #include <numbers>
 
-namespace gewebe {
+namespace gewebe::test {
 namespace {
 
 TEST(Endoscope, LightAboveTheLens) {
-  CameraOptions options;
+  shading::CameraOptions options;
   options.eye = Vec3{10, 200, 30};
   options.target = Vec3{10, 0, 30};
-  const Camera camera = make_camera(options, {}, 64, 64);
-  EXPECT_NEAR(norm(endoscope_light(camera) - Vec3{10, 200, 33}), 0, 1e-12);
+  const shading::Camera camera = shading::make_camera(options, {}, 64, 64);
+  EXPECT_NEAR(norm(shading::endoscope_light(camera) - Vec3{10, 200, 33}), 0, 1e-12);
 }
 
 TEST(Endoscope, LightThatIsLeft) {
-  EXPECT_EQ(light_left(0, 1e9), 1);
-  EXPECT_EQ(light_left(50, 20), 1);
-  EXPECT_EQ(light_left(50, 50), 1);
-  EXPECT_DOUBLE_EQ(light_left(50, 200), 0.25);
+  EXPECT_EQ(shading::light_left(0, 1e9), 1);
+  EXPECT_EQ(shading::light_left(50, 20), 1);
+  EXPECT_EQ(shading::light_left(50, 50), 1);
+  EXPECT_DOUBLE_EQ(shading::light_left(50, 200), 0.25);
 }
 
 // By angles, as the contract has it.
 TEST(Endoscope, FieldOfItsLens) {
   for (const auto& [width, height] : {std::pair{121U, 81U}, {64U, 100U}}) {
-    CameraOptions options;
+    shading::CameraOptions options;
     options.eye = Vec3{0, 100, 0};
     options.target = Vec3{};
     options.fov = 70;
-    const Camera camera = make_camera(options, {}, width, height);
-    Image image{width, height, 3, {}};
+    const shading::Camera camera = shading::make_camera(options, {}, width, height);
+    texture::Image image{width, height, 3, {}};
     image.values.assign(std::size_t{3} * width * height, 240);
-    look_through_endoscope(image, camera);
+    shading::look_through_endoscope(image, camera);
     const double half = std::min(width, height) / 2.0;
     double largest = 0;
     for (std::uint32_t y = 0; y < height; ++y)
@@ -69,15 +69,15 @@ TEST(Endoscope, FieldOfItsLens) {
 }
 
 TEST(Endoscope, VerticesFarFromItsLightAreDarker) {
-  std::vector<Surface> surfaces(1);
+  std::vector<shading::Surface> surfaces(1);
   surfaces[0].mesh = test::sphere_mesh(2, 10, {});
-  DrawingOptions options;
+  shading::DrawingOptions options;
   options.shade = 0.5;
   options.light = {0, 15, 0};
-  options.camera = make_camera({}, rest_box(surfaces), 32, 32);
-  const Drawing full = make_drawing(surfaces, options, {});
+  options.camera = shading::make_camera({}, shading::rest_box(surfaces), 32, 32);
+  const shading::Drawing full = shading::make_drawing(surfaces, options, {});
   options.full_distance = 8;
-  const Drawing left = make_drawing(surfaces, options, {});
+  const shading::Drawing left = shading::make_drawing(surfaces, options, {});
   double least = 1;
   for (std::size_t v = 0; v < left.vertices.size(); ++v) {
     const double distance = norm(surfaces[0].mesh.points[v] - options.light);
@@ -89,33 +89,35 @@ TEST(Endoscope, VerticesFarFromItsLightAreDarker) {
   EXPECT_LT(least, 0.33);
 }
 
-Image drawn(const std::vector<Surface>& surfaces, const Camera& camera, const Vec3& light) {
-  DrawingOptions options;
+texture::Image drawn(const std::vector<shading::Surface>& surfaces, const shading::Camera& camera,
+                     const Vec3& light) {
+  shading::DrawingOptions options;
   options.shade = 0.6;
   options.light = light;
   options.camera = camera;
-  options.insides = std::ranges::any_of(surfaces, &Surface::inside);
-  SurfaceMaterial material;
+  options.insides = std::ranges::any_of(surfaces, &shading::Surface::inside);
+  texture::SurfaceMaterial material;
   material.color = {0.8, 0.5, 0.4};
   if (options.insides) {
     material.others.emplace_back();
     material.others[0].color = {0.5, 0.1, 0.2};
   }
-  PictureOptions picture;
-  picture.backend = Backend::cpu;
+  render::PictureOptions picture;
+  picture.backend = render::Backend::cpu;
   picture.width = picture.height = 128;
-  return make_picture(make_drawing(surfaces, options, {}), camera, material, picture, {});
+  return render::make_picture(shading::make_drawing(surfaces, options, {}), camera, material,
+                              picture, {});
 }
 
 TEST(TwoSided, TrianglesArePartedByWhereTheyFace) {
-  std::vector<Surface> surfaces(2);
+  std::vector<shading::Surface> surfaces(2);
   surfaces[0].mesh = test::sphere_mesh(3, 10, {1, 2, 3});
   surfaces[1].mesh = test::sphere_mesh(1, 2, {20, 2, 3});
   surfaces[1].instrument = true;
   for (std::size_t t = 0; t < surfaces[0].mesh.triangles.size(); ++t)
     surfaces[0].mesh.material.push_back(static_cast<std::int32_t>(t));
   const Vec3 eye{30, 50, 20};
-  const std::vector<Surface> both = two_sided(surfaces, eye);
+  const std::vector<shading::Surface> both = shading::two_sided(surfaces, eye);
   ASSERT_EQ(both.size(), 3U);
   EXPECT_TRUE(both[1].instrument && both[1].mesh.triangles == surfaces[1].mesh.triangles);
   EXPECT_TRUE(both[2].inside);
@@ -130,7 +132,7 @@ TEST(TwoSided, TrianglesArePartedByWhereTheyFace) {
   for (std::size_t t = 0; t < front.triangles.size(); ++t)
     EXPECT_EQ(front.triangles[t],
               surfaces[0].mesh.triangles[static_cast<std::size_t>(front.material[t])]);
-  const std::vector<Vec3> whole = render_normals(surfaces[0].mesh);
+  const std::vector<Vec3> whole = shading::render_normals(surfaces[0].mesh);
   for (std::size_t p = 0; p < whole.size(); ++p)
     for (int a = 0; a < 3; ++a) {
       EXPECT_EQ(front.normals[p][static_cast<std::size_t>(a)], static_cast<float>(whole[p][a]));
@@ -139,11 +141,12 @@ TEST(TwoSided, TrianglesArePartedByWhereTheyFace) {
 }
 
 TEST(TwoSided, AClosedBodyLooksAsItDid) {
-  std::vector<Surface> surfaces(1);
+  std::vector<shading::Surface> surfaces(1);
   surfaces[0].mesh = test::sphere_mesh(3, 10, {1, 2, 3});
-  const Camera camera = make_camera({}, rest_box(surfaces), 128, 128);
-  const Image one = drawn(surfaces, camera, {100, 100, 100});
-  const Image both = drawn(two_sided(surfaces, camera.eye), camera, {100, 100, 100});
+  const shading::Camera camera = shading::make_camera({}, shading::rest_box(surfaces), 128, 128);
+  const texture::Image one = drawn(surfaces, camera, {100, 100, 100});
+  const texture::Image both =
+      drawn(shading::two_sided(surfaces, camera.eye), camera, {100, 100, 100});
   for (std::size_t n = 0; n < one.values.size(); ++n)
     ASSERT_LE(std::abs(one.values[n] - both.values[n]), 1) << n;
 }
@@ -151,18 +154,18 @@ TEST(TwoSided, AClosedBodyLooksAsItDid) {
 // The far half of a sphere, seen and lit from its middle axis: the inside's colour, bright where
 // its normal, turned around, faces the light.
 TEST(TwoSided, ABowlHasTheColourOfItsInside) {
-  std::vector<Surface> surfaces(1);
+  std::vector<shading::Surface> surfaces(1);
   TriangleMesh& mesh = surfaces[0].mesh;
   mesh = test::sphere_mesh(4, 10, {});
   std::erase_if(mesh.triangles, [&](const Triangle& t) {
     return std::ranges::any_of(t, [&](std::uint32_t p) { return mesh.points[p].y > 0; });
   });
-  CameraOptions options;
+  shading::CameraOptions options;
   options.eye = Vec3{0, 80, 0};
   options.target = Vec3{};
-  const Camera camera = make_camera(options, {}, 128, 128);
+  const shading::Camera camera = shading::make_camera(options, {}, 128, 128);
   const Vec3 light{0, 1e7, 0};
-  const Image image = drawn(two_sided(surfaces, camera.eye), camera, light);
+  const texture::Image image = drawn(shading::two_sided(surfaces, camera.eye), camera, light);
   for (int x = 44; x < 84; ++x) {                              // on a line across the middle
     const double across = ((x + 0.5) / 64 - 1) * camera.tan_x; // over the distance
     // The ray from the eye meets the sphere's far side.
@@ -183,4 +186,4 @@ TEST(TwoSided, ABowlHasTheColourOfItsInside) {
 }
 
 } // namespace
-} // namespace gewebe
+} // namespace gewebe::test

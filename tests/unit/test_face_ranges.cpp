@@ -12,7 +12,7 @@
 #include <set>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::test {
 namespace {
 
 Context on(int threads) {
@@ -38,8 +38,8 @@ TEST(FaceRanges, BlocksHoldAllFacesOfARange) {
   for (const std::size_t far : {std::size_t{0}, std::size_t{5}, std::size_t{60000}}) {
     constexpr std::uint32_t points = 600000;
     const std::vector<Triangle> triangles = band(points, far);
-    const FaceRanges ranges(triangles, points, on(2));
-    EXPECT_EQ(FaceRanges(triangles, points, on(1)).grain(), ranges.grain());
+    const mesh::FaceRanges ranges(triangles, points, on(2));
+    EXPECT_EQ(mesh::FaceRanges(triangles, points, on(1)).grain(), ranges.grain());
     std::size_t whole_blocks = 0, looked_at = 0, corners = 0;
     for (std::size_t begin = 0; begin < points; begin += ranges.grain()) {
       const std::size_t end = std::min<std::size_t>(points, begin + ranges.grain());
@@ -65,9 +65,9 @@ TEST(FaceRanges, BlocksHoldAllFacesOfARange) {
 
 TEST(FaceRanges, AFaceIsOfTheRangesOfItsFirstAndLastPoint) {
   const std::vector<Triangle> none;
-  const auto border = static_cast<std::uint32_t>(FaceRanges(none, 0, on(1)).grain());
+  const auto border = static_cast<std::uint32_t>(mesh::FaceRanges(none, 0, on(1)).grain());
   const std::vector<Triangle> one{{border - 1, border, border - 1}};
-  const FaceRanges ranges(one, 2 * border, on(1));
+  const mesh::FaceRanges ranges(one, 2 * border, on(1));
   ASSERT_EQ(ranges.grain(), border);
   for (const std::size_t begin : {std::size_t{0}, std::size_t{border}}) {
     std::size_t blocks = 0;
@@ -86,7 +86,7 @@ TEST(FaceRanges, PointsInDisorderAreLookedAtInFewRanges) {
   for (Triangle& t : triangles)
     for (std::uint32_t& corner : t)
       corner = static_cast<std::uint32_t>(random() % points);
-  const FaceRanges ranges(triangles, points, on(2));
+  const mesh::FaceRanges ranges(triangles, points, on(2));
   EXPECT_GE(ranges.grain() * 16, points);
   EXPECT_LT(ranges.grain() * 8, points);
 }
@@ -123,7 +123,7 @@ TEST(UsableSurface, IsThatOfAPlainLoop) {
   ASSERT_GT(twice, 0U);
   ASSERT_LT(used.size(), mesh.points.size());
   for (const int threads : {1, 3}) {
-    const UsableSurface s = usable_surface(mesh, on(threads));
+    const model::UsableSurface s = model::usable_surface(mesh, on(threads));
     EXPECT_EQ(s.face_of_triangle, faces);
     EXPECT_EQ(s.point_of_node, std::vector<std::uint32_t>(used.begin(), used.end()));
     EXPECT_EQ(s.degenerate_faces, degenerate);
@@ -136,7 +136,7 @@ TEST(UsableSurface, IsThatOfAPlainLoop) {
     EXPECT_EQ(s.edges.corners.size(), 3 * faces.size());
   }
   mesh.triangles = {{0, 1, 1}};
-  EXPECT_THROW((void)usable_surface(mesh, on(1)), Error);
+  EXPECT_THROW((void)model::usable_surface(mesh, on(1)), Error);
 }
 
 TEST(TouchedPages, HoldWhatIsWritten) {
@@ -151,4 +151,4 @@ TEST(TouchedPages, HoldWhatIsWritten) {
 }
 
 } // namespace
-} // namespace gewebe
+} // namespace gewebe::test

@@ -8,12 +8,12 @@
 #include <cmath>
 #include <random>
 
-namespace gewebe {
+namespace gewebe::test {
 namespace {
 
 /// Of all facets one by one.
-double nearest_of_all(const std::vector<FacetCorners>& facets, const Vec3& from, const Vec3& along,
-                      double most) {
+double nearest_of_all(const std::vector<shading::FacetCorners>& facets, const Vec3& from,
+                      const Vec3& along, double most) {
   double nearest = most;
   for (const auto& [a, b, c] : facets) {
     const Vec3 edge1 = b - a, edge2 = c - a, p = cross(along, edge2), to = from - a;
@@ -34,9 +34,9 @@ std::vector<CpuLevel> levels() {
                                                 : std::vector{CpuLevel::baseline, CpuLevel::avx2};
 }
 
-std::vector<FacetCorners> random_facets(std::size_t count, std::mt19937& random) {
+std::vector<shading::FacetCorners> random_facets(std::size_t count, std::mt19937& random) {
   std::uniform_real_distribution<double> place(-10, 10), near(-1, 1);
-  std::vector<FacetCorners> facets(count);
+  std::vector<shading::FacetCorners> facets(count);
   for (auto& [a, b, c] : facets) {
     a = {place(random), place(random), place(random)};
     b = a + Vec3{near(random), near(random), near(random)};
@@ -56,8 +56,8 @@ TEST(FacetTree, FindsWhatALookAtAllFinds) {
   std::uniform_real_distribution<double> place(-12, 12);
   int met = 0;
   for (const std::size_t count : {1u, 2u, 4u, 5u, 8u, 9u, 16u, 17u, 63u, 1000u}) {
-    const std::vector<FacetCorners> facets = random_facets(count, random);
-    const FacetTree tree = facet_tree(facets);
+    const std::vector<shading::FacetCorners> facets = random_facets(count, random);
+    const shading::FacetTree tree = shading::facet_tree(facets);
     for (int n = 0; n < 500; ++n) {
       const Vec3 from{place(random), place(random), place(random)};
       const Vec3 along = random_direction(random);
@@ -65,7 +65,7 @@ TEST(FacetTree, FindsWhatALookAtAllFinds) {
         const double all = nearest_of_all(facets, from, along, most);
         met += all < most ? 1 : 0;
         for (const CpuLevel level : levels())
-          ASSERT_EQ(first_hit(level)(tree, from, along, most), all) << count << ' ' << n;
+          ASSERT_EQ(shading::first_hit(level)(tree, from, along, most), all) << count << ' ' << n;
       }
     }
   }
@@ -74,7 +74,7 @@ TEST(FacetTree, FindsWhatALookAtAllFinds) {
 
 // Unit squares of a grid: rays along an axis run in sides of boxes, where 0 · ∞ comes up.
 TEST(FacetTree, RaysAlongAnAxisRunInSidesOfBoxes) {
-  std::vector<FacetCorners> facets;
+  std::vector<shading::FacetCorners> facets;
   for (int x = 0; x < 8; ++x)
     for (int y = 0; y < 8; ++y) {
       const Vec3 o{static_cast<double>(x), static_cast<double>(y),
@@ -82,7 +82,7 @@ TEST(FacetTree, RaysAlongAnAxisRunInSidesOfBoxes) {
       facets.push_back({o, o + Vec3{1, 0, 0}, o + Vec3{1, 1, 0}});
       facets.push_back({o, o + Vec3{1, 1, 0}, o + Vec3{0, 1, 0}});
     }
-  const FacetTree tree = facet_tree(facets);
+  const shading::FacetTree tree = shading::facet_tree(facets);
   int met = 0;
   for (int x = 0; x <= 16; ++x)
     for (int y = 0; y <= 16; ++y)
@@ -91,19 +91,21 @@ TEST(FacetTree, RaysAlongAnAxisRunInSidesOfBoxes) {
         const double all = nearest_of_all(facets, from, along, 100);
         met += all < 100 ? 1 : 0;
         for (const CpuLevel level : levels())
-          ASSERT_EQ(first_hit(level)(tree, from, along, 100), all) << x << ' ' << y << ' ' << sign;
+          ASSERT_EQ(shading::first_hit(level)(tree, from, along, 100), all)
+              << x << ' ' << y << ' ' << sign;
       }
   EXPECT_EQ(met, 2 * 17 * 17);
 }
 
 TEST(FacetTree, NothingIsMetWhereNothingIs) {
-  const FacetTree none = facet_tree({});
-  const FacetTree point = facet_tree(std::vector<FacetCorners>(9, FacetCorners{})); // no area
+  const shading::FacetTree none = shading::facet_tree({});
+  const shading::FacetTree point = shading::facet_tree(
+      std::vector<shading::FacetCorners>(9, shading::FacetCorners{})); // no area
   for (const CpuLevel level : levels()) {
-    EXPECT_EQ(first_hit(level)(none, {}, {1, 0, 0}, 7), 7);
-    EXPECT_EQ(first_hit(level)(point, {-1, 0, 0}, {1, 0, 0}, 7), 7);
+    EXPECT_EQ(shading::first_hit(level)(none, {}, {1, 0, 0}, 7), 7);
+    EXPECT_EQ(shading::first_hit(level)(point, {-1, 0, 0}, {1, 0, 0}, 7), 7);
   }
 }
 
 } // namespace
-} // namespace gewebe
+} // namespace gewebe::test

@@ -23,7 +23,7 @@ using namespace gewebe::test;
 namespace {
 
 /// Keeps columns in memory.
-class KeptColumns final : public ColumnSink {
+class KeptColumns final : public columns::ColumnSink {
 public:
   void write(std::size_t k, std::span<const double> columns, double) override {
     EXPECT_EQ(k, kept.size());
@@ -52,12 +52,13 @@ std::vector<std::uint32_t> every(std::size_t count, std::uint32_t step) {
 }
 
 /// max |K C - I| over the free axes of some nodes.
-double identity_error(const Model& model, std::uint32_t step) {
-  const StiffnessMatrix k = stiffness_matrix(model);
-  const Factor factor(k, {});
+double identity_error(const model::Model& model, std::uint32_t step) {
+  const linalg::StiffnessMatrix k = fem::stiffness_matrix(model);
+  const linalg::Factor factor(k, {});
   KeptColumns sink;
   const auto nodes = every(model.nodes.size(), step);
-  EXPECT_LE(compliance_columns(k, factor, stiffness_norm(k), nodes, {}, sink), max_backward_error);
+  EXPECT_LE(columns::compliance_columns(k, factor, linalg::stiffness_norm(k), nodes, {}, sink),
+            linalg::max_backward_error);
   double worst = 0;
   std::vector<double> f(3 * model.nodes.size());
   for (std::size_t c = 0; c < nodes.size(); ++c)
@@ -68,7 +69,7 @@ double identity_error(const Model& model, std::uint32_t step) {
         EXPECT_TRUE(std::all_of(u.begin(), u.end(), [](double value) { return value == 0; }));
         continue;
       }
-      multiply_stiffness(model, u, f);
+      fem::multiply_stiffness(model, u, f);
       for (std::size_t i = 0; i < f.size(); ++i)
         if (k.row_of_axis[i] >= 0)
           worst = test::larger(worst, std::abs(f[i] - (i == axis ? 1 : 0)));
@@ -96,10 +97,10 @@ TEST(Factor, InvertsTheMatrixOfAColon) {
 }
 
 TEST(Factor, SolvesTheSameBitsWhateverIsBesideIt) {
-  const StiffnessMatrix k = stiffness_matrix(model_of(ball(3)));
+  const linalg::StiffnessMatrix k = fem::stiffness_matrix(model_of(ball(3)));
   Context baseline;
   baseline.cpu = CpuLevel::baseline;
-  const Factor factor(k, {}), plain(k, baseline);
+  const linalg::Factor factor(k, {}), plain(k, baseline);
   const std::size_t n = k.order(), count = 19;
   std::vector<double> f = random_vector(n * count, 1), all(f.size()), one(n), u(f.size());
   std::fill_n(f.begin() + static_cast<std::ptrdiff_t>(3 * n), n, -0.0); // a zero right-hand side
@@ -126,13 +127,13 @@ TEST(Factor, SolvesTheSameBitsWhateverIsBesideIt) {
                            all.begin() + static_cast<std::ptrdiff_t>(c % count * n)));
 }
 
-bool same_numbers(const Factor& a, const Factor& b) {
+bool same_numbers(const linalg::Factor& a, const linalg::Factor& b) {
   return a.entries() == b.entries() &&
          std::memcmp(a.view().x.data(), b.view().x.data(), 8 * a.entries()) == 0;
 }
 
 /// Whether supernode k is of the front that the one before it is of: it has the rest of its rows.
-bool goes_on(const FactorView& l, std::size_t k) {
+bool goes_on(const linalg::FactorView& l, std::size_t k) {
   if (k == 0)
     return false;
   const std::int64_t columns = l.super[k] - l.super[k - 1];
@@ -141,7 +142,7 @@ bool goes_on(const FactorView& l, std::size_t k) {
                     l.s.begin() + l.pi[k - 1] + columns);
 }
 
-std::size_t blocks_of_widest_front(const FactorView& l) {
+std::size_t blocks_of_widest_front(const linalg::FactorView& l) {
   std::size_t most = 0, blocks = 0;
   for (std::size_t k = 0; k + 1 < l.super.size(); ++k) {
     blocks = goes_on(l, k) ? blocks + 1 : 1;
@@ -151,9 +152,9 @@ std::size_t blocks_of_widest_front(const FactorView& l) {
 }
 
 /// The same with one supernode a front, as stores held it before.
-FactorData by_fronts(const Factor& factor) {
-  const FactorView l = factor.view();
-  FactorData d = factor.data();
+linalg::FactorData by_fronts(const linalg::Factor& factor) {
+  const linalg::FactorView l = factor.view();
+  linalg::FactorData d = factor.data();
   d.super = d.pi = d.px = {0};
   d.s.clear();
   d.x.clear();
@@ -182,19 +183,19 @@ FactorData by_fronts(const Factor& factor) {
 }
 
 TEST(Factor, OfAStoreMayHaveSupernodesOfAnyWidth) {
-  const StiffnessMatrix k = stiffness_matrix(block_of_material(13));
-  const Factor factor(k, {}), wide(by_fronts(factor), {});
+  const linalg::StiffnessMatrix k = fem::stiffness_matrix(block_of_material(13));
+  const linalg::Factor factor(k, {}), wide(by_fronts(factor), {});
   EXPECT_LT(wide.view().super.size(), factor.view().super.size());
   EXPECT_GT(wide.entries(), factor.entries() * 11 / 10);
   const std::vector<double> f = random_vector(k.order(), 4);
   std::vector<double> u(f.size());
   wide.solve(f, u);
-  EXPECT_LE(backward_error(k, stiffness_norm(k), u, f), 1e-15);
+  EXPECT_LE(linalg::backward_error(k, linalg::stiffness_norm(k), u, f), 1e-15);
 }
 
 TEST(Factor, HoldsLittleMoreThanTheEntriesOfL) {
-  const Factor factor(stiffness_matrix(block_of_material(13)), {});
-  const FactorView l = factor.view();
+  const linalg::Factor factor(fem::stiffness_matrix(block_of_material(13)), {});
+  const linalg::FactorView l = factor.view();
   std::int64_t entries = 0, widest = 0;
   for (const std::int64_t count : l.column_count)
     entries += count;
@@ -208,47 +209,47 @@ TEST(Factor, HoldsLittleMoreThanTheEntriesOfL) {
 }
 
 TEST(Factor, SolvesForABlockOfMaterialAndAShiftedOne) {
-  const StiffnessMatrix k = stiffness_matrix(block_of_material(13));
-  Factor factor(k, {});
-  const FactorView l = factor.view();
+  const linalg::StiffnessMatrix k = fem::stiffness_matrix(block_of_material(13));
+  linalg::Factor factor(k, {});
+  const linalg::FactorView l = factor.view();
   EXPECT_GT(blocks_of_widest_front(l), 2U);
   const std::vector<double> f = random_vector(k.order(), 4);
   std::vector<double> u(f.size());
   factor.solve(f, u);
-  EXPECT_LE(backward_error(k, stiffness_norm(k), u, f), 1e-15);
-  StiffnessMatrix shifted = k;
+  EXPECT_LE(linalg::backward_error(k, linalg::stiffness_norm(k), u, f), 1e-15);
+  linalg::StiffnessMatrix shifted = k;
   for (std::size_t c = 0; c < k.order(); ++c)
     shifted.value[static_cast<std::size_t>(k.column_start[c])] += 0.01 * static_cast<double>(c % 5);
   factor.refactor(shifted, {});
   factor.solve(f, u);
-  EXPECT_LE(backward_error(shifted, stiffness_norm(shifted), u, f), 1e-15);
-  EXPECT_FALSE(backward_error(k, stiffness_norm(k), u, f) <= 1e-12);
-  EXPECT_TRUE(same_numbers(factor, Factor(shifted, {})));
+  EXPECT_LE(linalg::backward_error(shifted, linalg::stiffness_norm(shifted), u, f), 1e-15);
+  EXPECT_FALSE(linalg::backward_error(k, linalg::stiffness_norm(k), u, f) <= 1e-12);
+  EXPECT_TRUE(same_numbers(factor, linalg::Factor(shifted, {})));
   shifted.value[static_cast<std::size_t>(k.column_start[1000])] = -1;
   try {
     factor.refactor(shifted, {});
     ADD_FAILURE();
-  } catch (const NotPositiveDefinite& error) {
+  } catch (const linalg::NotPositiveDefinite& error) {
     EXPECT_LT(error.row(), k.order());
   }
 }
 
 TEST(Factor, IsTheSameOnAnyThreadsAndProcessors) {
-  const StiffnessMatrix k = stiffness_matrix(block_of_material(11));
+  const linalg::StiffnessMatrix k = fem::stiffness_matrix(block_of_material(11));
   Context one = threads(1);
-  const Factor factor(k, one);
+  const linalg::Factor factor(k, one);
   for (const int count : {2, 3, 7})
-    EXPECT_TRUE(same_numbers(factor, Factor(k, threads(count)))) << count;
-  const StiffnessMatrix small = stiffness_matrix(block_of_material(8));
+    EXPECT_TRUE(same_numbers(factor, linalg::Factor(k, threads(count)))) << count;
+  const linalg::StiffnessMatrix small = fem::stiffness_matrix(block_of_material(8));
   Context baseline;
   baseline.cpu = CpuLevel::baseline;
-  EXPECT_TRUE(same_numbers(Factor(small, {}), Factor(small, baseline)));
+  EXPECT_TRUE(same_numbers(linalg::Factor(small, {}), linalg::Factor(small, baseline)));
 }
 
 TEST(Factor, NamesTheSamePivotOnAnyThreads) {
-  StiffnessMatrix k = stiffness_matrix(block_of_material(13));
-  Factor factor(k, {});
-  const FactorView l = factor.view();
+  linalg::StiffnessMatrix k = fem::stiffness_matrix(block_of_material(13));
+  linalg::Factor factor(k, {});
+  const linalg::FactorView l = factor.view();
   for (std::size_t f = 0; f < l.super.size() / 2; f += 20) { // in many subtrees
     const auto row = static_cast<std::size_t>(l.permutation[static_cast<std::size_t>(l.super[f])]);
     k.value[static_cast<std::size_t>(k.column_start[row])] = -1;
@@ -257,7 +258,7 @@ TEST(Factor, NamesTheSamePivotOnAnyThreads) {
     try {
       factor.refactor(k, threads(count));
       ADD_FAILURE() << count;
-    } catch (const NotPositiveDefinite& error) {
+    } catch (const linalg::NotPositiveDefinite& error) {
       EXPECT_EQ(static_cast<std::int64_t>(error.row()), l.permutation[0]) << count;
     }
 }
@@ -284,11 +285,12 @@ TEST(Factor, RoundsOnceWhereTheProcessorRoundsTwice) {
   std::size_t different = 0;
   for (const std::int64_t range : {0, 2, 30, 60, 1020})
     for (int round = 0; round < 100000; ++round) {
-      const Pair a{number(range), number(range)}, b{number(range), number(range)};
-      Pair sum{number(range), number(range)};
+      const cholesky::Pair a{number(range), number(range)}, b{number(range), number(range)};
+      cholesky::Pair sum{number(range), number(range)};
       if (round % 2 == 0) // much is cancelled, or little is missing to half a digit
-        sum = Pair{std::ldexp(a[0] * b[0], round % 108 - 54), std::nextafter(a[1] * b[1], 0)};
-      const Pair fused = lose_fused(sum, a, b);
+        sum = cholesky::Pair{std::ldexp(a[0] * b[0], round % 108 - 54),
+                             std::nextafter(a[1] * b[1], 0)};
+      const cholesky::Pair fused = cholesky::lose_fused(sum, a, b);
       for (std::size_t lane = 0; lane < 2; ++lane) {
         const double expected = std::fma(-a[lane], b[lane], sum[lane]), got = fused[lane];
         different += std::memcmp(&expected, &got, sizeof got) != 0 &&
@@ -301,27 +303,27 @@ TEST(Factor, RoundsOnceWhereTheProcessorRoundsTwice) {
 }
 
 TEST(Factor, KeepsTheBackwardErrorAndItsMeasureCanFail) {
-  const StiffnessMatrix k = stiffness_matrix(model_of(ball(3)));
-  const Factor factor(k, {});
-  const double norm = stiffness_norm(k);
+  const linalg::StiffnessMatrix k = fem::stiffness_matrix(model_of(ball(3)));
+  const linalg::Factor factor(k, {});
+  const double norm = linalg::stiffness_norm(k);
   const std::vector<double> f = random_vector(k.order(), 3);
   std::vector<double> x(k.order());
   factor.solve(f, x);
-  EXPECT_LE(backward_error(k, norm, x, f), 1e-15);
+  EXPECT_LE(linalg::backward_error(k, norm, x, f), 1e-15);
   x[7] *= 1 + 1e-10;
-  EXPECT_FALSE(backward_error(k, norm, x, f) <= max_backward_error);
+  EXPECT_FALSE(linalg::backward_error(k, norm, x, f) <= linalg::max_backward_error);
   x[7] = NAN;
-  EXPECT_FALSE(backward_error(k, norm, x, f) <= max_backward_error);
+  EXPECT_FALSE(linalg::backward_error(k, norm, x, f) <= linalg::max_backward_error);
 }
 
 TEST(Factor, SolvesOnAllAxes) {
-  const Model model = model_of(ball(2));
-  const StiffnessMatrix k = stiffness_matrix(model);
-  const Factor factor(k, {});
+  const model::Model model = model_of(ball(2));
+  const linalg::StiffnessMatrix k = fem::stiffness_matrix(model);
+  const linalg::Factor factor(k, {});
   const std::vector<double> f = random_vector(3 * model.nodes.size(), 3);
   std::vector<double> u(f.size()), g(f.size());
-  solve_axes(k, factor, f, u);
-  multiply_stiffness(model, u, g);
+  linalg::solve_axes(k, factor, f, u);
+  fem::multiply_stiffness(model, u, g);
   Vec3 sum; // applied forces and the reactions of the supports cancel
   for (std::size_t i = 0; i < f.size(); ++i) {
     if (k.row_of_axis[i] >= 0) {
@@ -335,10 +337,10 @@ TEST(Factor, SolvesOnAllAxes) {
 }
 
 TEST(Factor, OrderAndUnitsDoNotMatterBeyondTheCondition) {
-  const Model model = stretched(model_of(ball(3)), 1.05);
-  const StiffnessMatrix k = stiffness_matrix(model);
-  StiffnessCheck check;
-  const Factor factor = checked_factor(model, k, {}, check);
+  const model::Model model = stretched(model_of(ball(3)), 1.05);
+  const linalg::StiffnessMatrix k = fem::stiffness_matrix(model);
+  linalg::StiffnessCheck check;
+  const linalg::Factor factor = linalg::checked_factor(model, k, {}, check);
   const std::vector<double> f = random_vector(k.order(), 6);
   std::vector<double> u(f.size());
   factor.solve(f, u);
@@ -353,7 +355,7 @@ TEST(Factor, OrderAndUnitsDoNotMatterBeyondTheCondition) {
          at < static_cast<std::size_t>(k.column_start[c + 1]); ++at)
       columns[n - 1 - static_cast<std::size_t>(k.row[at])].emplace_back(
           static_cast<std::int64_t>(n - 1 - c), k.value[at]);
-  StiffnessMatrix back;
+  linalg::StiffnessMatrix back;
   back.axis_of_row = k.axis_of_row;
   for (auto& column : columns) {
     std::sort(column.begin(), column.end());
@@ -365,27 +367,27 @@ TEST(Factor, OrderAndUnitsDoNotMatterBeyondTheCondition) {
   }
   back.column_start.push_back(static_cast<std::int64_t>(back.row.size()));
   std::vector<double> g(f.rbegin(), f.rend()), v(n);
-  Factor(back, {}).solve(g, v);
+  linalg::Factor(back, {}).solve(g, v);
   for (std::size_t r = 0; r < n; ++r)
     EXPECT_NEAR(v[n - 1 - r], u[r], tolerance);
 
   for (const double scale : {1e-9, 1e9}) {
-    Model scaled = model;
-    for (Node& node : scaled.nodes)
+    model::Model scaled = model;
+    for (model::Node& node : scaled.nodes)
       node.position *= scale;
-    for (Spring& s : scaled.springs)
+    for (model::Spring& s : scaled.springs)
       s.rest *= scale;
-    const StiffnessMatrix ks = stiffness_matrix(scaled);
-    Factor(ks, {}).solve(f, v);
+    const linalg::StiffnessMatrix ks = fem::stiffness_matrix(scaled);
+    linalg::Factor(ks, {}).solve(f, v);
     for (std::size_t r = 0; r < n; ++r)
       EXPECT_NEAR(v[r], u[r], tolerance);
   }
 }
 
 TEST(Factor, ComesApartAndTogether) {
-  const StiffnessMatrix k = stiffness_matrix(model_of(ball(2)));
-  const Factor factor(k, {});
-  const Factor again(factor.data());
+  const linalg::StiffnessMatrix k = fem::stiffness_matrix(model_of(ball(2)));
+  const linalg::Factor factor(k, {});
+  const linalg::Factor again(factor.data());
   const std::vector<double> f = random_vector(k.order(), 1);
   std::vector<double> a(f.size()), b(f.size());
   factor.solve(f, a);
@@ -396,7 +398,7 @@ TEST(Factor, ComesApartAndTogether) {
 }
 
 TEST(Factor, OfAFileMayReachRowsThatItsParentDoesNot) { // no factorisation makes such a one
-  FactorData d;
+  linalg::FactorData d;
   d.order = 3;
   d.max_row_size = 2;
   d.permutation = {0, 1, 2};
@@ -406,7 +408,7 @@ TEST(Factor, OfAFileMayReachRowsThatItsParentDoesNot) { // no factorisation make
   d.px = d.pi;
   d.s = {0, 1, 2, 1, 2};
   d.x = {2, 3, 5, 1, 1};
-  const Factor factor(d);
+  const linalg::Factor factor(d);
   const std::array<std::int64_t, 1> place{0};
   std::vector<double> x(3, NAN);
   ASSERT_EQ(factor.solve_units(place, x), 1u);
@@ -417,73 +419,74 @@ TEST(Factor, OfAFileMayReachRowsThatItsParentDoesNot) { // no factorisation make
 }
 
 TEST(Factor, RefusesArraysThatContradictThemselves) {
-  const FactorData good = Factor(stiffness_matrix(model_of(ball(1))), {}).data();
-  EXPECT_NO_THROW(Factor{good});
-  using Spoil = std::function<void(FactorData&)>;
+  const linalg::FactorData good =
+      linalg::Factor(fem::stiffness_matrix(model_of(ball(1))), {}).data();
+  EXPECT_NO_THROW(linalg::Factor{good});
+  using Spoil = std::function<void(linalg::FactorData&)>;
   const std::vector<Spoil> spoils{
-      [](FactorData& d) { ++d.order; },
-      [](FactorData& d) { d.order = 0; },
-      [](FactorData& d) { d.order = -1; },
-      [](FactorData& d) { d.order = INT64_MAX; },
-      [](FactorData& d) { d.permutation[0] = d.permutation[1]; },
-      [](FactorData& d) { d.permutation[0] = -1; },
-      [](FactorData& d) { d.permutation[0] = d.order; },
-      [](FactorData& d) { d.permutation.pop_back(); },
-      [](FactorData& d) { d.column_count[2] = 0; },
-      [](FactorData& d) { d.column_count[2] = d.order + 1; },
-      [](FactorData& d) { d.super[1] = 0; },
-      [](FactorData& d) { d.super[0] = 1; },
-      [](FactorData& d) { d.super.back() -= 1; },
-      [](FactorData& d) { d.super[1] = d.super[2] + 1; },
-      [](FactorData& d) { d.super = {0}; },
-      [](FactorData& d) { d.super.clear(); },
-      [](FactorData& d) { d.pi[1] += 1; },
-      [](FactorData& d) { d.pi[1] = INT64_MAX; },
-      [](FactorData& d) { d.pi[1] = INT64_MIN; },
-      [](FactorData& d) { d.pi.back() = 1; },
-      [](FactorData& d) { d.px[1] -= 1; },
-      [](FactorData& d) { d.px.back() = -1; },
-      [](FactorData& d) { d.s[0] = 1; },
-      [](FactorData& d) { d.s[static_cast<std::size_t>(d.pi[1] - 1)] = d.order; },
-      [](FactorData& d) { d.s[static_cast<std::size_t>(d.pi[1] - 1)] = -5; },
-      [](FactorData& d) { d.s.pop_back(); },
-      [](FactorData& d) { d.x.pop_back(); },
-      [](FactorData& d) { d.x[0] = 0; },
-      [](FactorData& d) { d.x[0] = NAN; },
-      [](FactorData& d) { d.x[1] = HUGE_VAL; },
-      [](FactorData& d) { d.max_row_size = 0; },
-      [](FactorData& d) { d.max_column_size = -1; },
+      [](linalg::FactorData& d) { ++d.order; },
+      [](linalg::FactorData& d) { d.order = 0; },
+      [](linalg::FactorData& d) { d.order = -1; },
+      [](linalg::FactorData& d) { d.order = INT64_MAX; },
+      [](linalg::FactorData& d) { d.permutation[0] = d.permutation[1]; },
+      [](linalg::FactorData& d) { d.permutation[0] = -1; },
+      [](linalg::FactorData& d) { d.permutation[0] = d.order; },
+      [](linalg::FactorData& d) { d.permutation.pop_back(); },
+      [](linalg::FactorData& d) { d.column_count[2] = 0; },
+      [](linalg::FactorData& d) { d.column_count[2] = d.order + 1; },
+      [](linalg::FactorData& d) { d.super[1] = 0; },
+      [](linalg::FactorData& d) { d.super[0] = 1; },
+      [](linalg::FactorData& d) { d.super.back() -= 1; },
+      [](linalg::FactorData& d) { d.super[1] = d.super[2] + 1; },
+      [](linalg::FactorData& d) { d.super = {0}; },
+      [](linalg::FactorData& d) { d.super.clear(); },
+      [](linalg::FactorData& d) { d.pi[1] += 1; },
+      [](linalg::FactorData& d) { d.pi[1] = INT64_MAX; },
+      [](linalg::FactorData& d) { d.pi[1] = INT64_MIN; },
+      [](linalg::FactorData& d) { d.pi.back() = 1; },
+      [](linalg::FactorData& d) { d.px[1] -= 1; },
+      [](linalg::FactorData& d) { d.px.back() = -1; },
+      [](linalg::FactorData& d) { d.s[0] = 1; },
+      [](linalg::FactorData& d) { d.s[static_cast<std::size_t>(d.pi[1] - 1)] = d.order; },
+      [](linalg::FactorData& d) { d.s[static_cast<std::size_t>(d.pi[1] - 1)] = -5; },
+      [](linalg::FactorData& d) { d.s.pop_back(); },
+      [](linalg::FactorData& d) { d.x.pop_back(); },
+      [](linalg::FactorData& d) { d.x[0] = 0; },
+      [](linalg::FactorData& d) { d.x[0] = NAN; },
+      [](linalg::FactorData& d) { d.x[1] = HUGE_VAL; },
+      [](linalg::FactorData& d) { d.max_row_size = 0; },
+      [](linalg::FactorData& d) { d.max_column_size = -1; },
   };
   for (std::size_t i = 0; i < spoils.size(); ++i) {
-    FactorData bad = good;
+    linalg::FactorData bad = good;
     spoils[i](bad);
-    EXPECT_THROW(Factor{bad}, Error) << i;
+    EXPECT_THROW(linalg::Factor{bad}, Error) << i;
   }
 }
 
 TEST(Factor, RefusesTooMuchMemory) {
-  const StiffnessMatrix k = stiffness_matrix(model_of(ball(3)));
-  EXPECT_THROW(Factor(k, memory(10000)), Error);
+  const linalg::StiffnessMatrix k = fem::stiffness_matrix(model_of(ball(3)));
+  EXPECT_THROW(linalg::Factor(k, memory(10000)), Error);
   Context stopped;
   stopped.cancelled = [] { return true; };
-  EXPECT_THROW(Factor(k, stopped), Cancelled);
+  EXPECT_THROW(linalg::Factor(k, stopped), Cancelled);
 }
 
 TEST(ComplianceColumns, AreTheSameForAnyNumberOfThreadsAndNeighbours) {
-  const Model model = model_of(ball(3));
-  const StiffnessMatrix k = stiffness_matrix(model);
-  const Factor factor(k, {});
-  const double norm = stiffness_norm(k);
+  const model::Model model = model_of(ball(3));
+  const linalg::StiffnessMatrix k = fem::stiffness_matrix(model);
+  const linalg::Factor factor(k, {});
+  const double norm = linalg::stiffness_norm(k);
   std::array<KeptColumns, 4> sinks;
   const auto nodes = every(model.nodes.size(), 1);
   const auto some = every(model.nodes.size(), 13);
   int told = 0;
   Context single = threads(1);
   single.progress = [&](double) { ++told; };
-  compliance_columns(k, factor, norm, nodes, single, sinks[0]);
-  compliance_columns(k, factor, norm, nodes, threads(2), sinks[1]);
-  compliance_columns(k, factor, norm, nodes, threads(7), sinks[2]);
-  compliance_columns(k, factor, norm, some, threads(2), sinks[3]);
+  columns::compliance_columns(k, factor, norm, nodes, single, sinks[0]);
+  columns::compliance_columns(k, factor, norm, nodes, threads(2), sinks[1]);
+  columns::compliance_columns(k, factor, norm, nodes, threads(7), sinks[2]);
+  columns::compliance_columns(k, factor, norm, some, threads(2), sinks[3]);
   EXPECT_GT(told, 2);
   EXPECT_EQ(sinks[0].kept.size(), nodes.size());
   EXPECT_EQ(sinks[0].kept, sinks[1].kept);
@@ -497,19 +500,19 @@ TEST(ComplianceColumns, AreTheSameForAnyNumberOfThreadsAndNeighbours) {
 }
 
 TEST(ComplianceColumns, AreWhatSolvingForUnitForcesGives) {
-  const Model model = model_of(ball(2));
-  const StiffnessMatrix k = stiffness_matrix(model);
-  const Factor factor(k, {});
+  const model::Model model = model_of(ball(2));
+  const linalg::StiffnessMatrix k = fem::stiffness_matrix(model);
+  const linalg::Factor factor(k, {});
   KeptColumns sink;
   const auto nodes = every(model.nodes.size(), 1); // the last block isn't full
-  (void)compliance_columns(k, factor, stiffness_norm(k), nodes, {}, sink);
+  (void)columns::compliance_columns(k, factor, linalg::stiffness_norm(k), nodes, {}, sink);
   std::size_t different = 0;
   std::vector<double> f(3 * model.nodes.size()), u(f.size());
   for (const std::uint32_t node : nodes)
     for (std::size_t a = 0; a < 3; ++a) {
       std::fill(f.begin(), f.end(), 0.0);
       f[3 * std::size_t{node} + a] = 1;
-      solve_axes(k, factor, f, u);
+      linalg::solve_axes(k, factor, f, u);
       different +=
           std::memcmp(u.data(), sink.kept[node].data() + a * u.size(), 8 * u.size()) != 0 ? 1 : 0;
     }
@@ -517,24 +520,24 @@ TEST(ComplianceColumns, AreWhatSolvingForUnitForcesGives) {
 }
 
 TEST(ComplianceColumns, AreTheSameOnAnyProcessorAndWithFewerRows) {
-  const Model model = model_of(ball(3));
-  const StiffnessMatrix k = stiffness_matrix(model);
-  const double norm = stiffness_norm(k);
+  const model::Model model = model_of(ball(3));
+  const linalg::StiffnessMatrix k = fem::stiffness_matrix(model);
+  const double norm = linalg::stiffness_norm(k);
   const auto nodes = every(model.nodes.size(), 3);
   KeptColumns all;
-  (void)compliance_columns(k, Factor(k, {}), norm, nodes, {}, all);
+  (void)columns::compliance_columns(k, linalg::Factor(k, {}), norm, nodes, {}, all);
   for (const CpuLevel level : {CpuLevel::baseline, CpuLevel::avx2}) {
     if (level > best_cpu_level())
       continue;
     Context context;
     context.cpu = level;
     KeptColumns kept;
-    (void)compliance_columns(k, Factor(k, context), norm, nodes, context, kept);
+    (void)columns::compliance_columns(k, linalg::Factor(k, context), norm, nodes, context, kept);
     EXPECT_EQ(kept.kept, all.kept);
   }
   for (const std::size_t rows : {1u, 10u, 101u}) { // blocks of rows that end anywhere
     KeptColumns kept;
-    (void)compliance_columns(k, Factor(k, {}), norm, nodes, {}, kept, rows);
+    (void)columns::compliance_columns(k, linalg::Factor(k, {}), norm, nodes, {}, kept, rows);
     for (std::size_t i = 0; i < nodes.size(); ++i)
       for (std::size_t a = 0; a < 3; ++a)
         ASSERT_EQ(0, std::memcmp(kept.kept[i].data() + a * 3 * rows,
@@ -545,21 +548,24 @@ TEST(ComplianceColumns, AreTheSameOnAnyProcessorAndWithFewerRows) {
 }
 
 TEST(ComplianceColumns, StopsWhereTheSinkFailsOrMemoryIsShort) {
-  struct Full final : ColumnSink {
+  struct Full final : columns::ColumnSink {
     void write(std::size_t k, std::span<const double>, double) override {
       if (k == 20)
         throw Error("full");
     }
   } full;
-  const Model model = model_of(ball(3));
-  const StiffnessMatrix k = stiffness_matrix(model);
-  const Factor factor(k, {});
+  const model::Model model = model_of(ball(3));
+  const linalg::StiffnessMatrix k = fem::stiffness_matrix(model);
+  const linalg::Factor factor(k, {});
   const auto nodes = every(100, 1);
-  EXPECT_THROW(compliance_columns(k, factor, stiffness_norm(k), nodes, {}, full), Error);
+  EXPECT_THROW(columns::compliance_columns(k, factor, linalg::stiffness_norm(k), nodes, {}, full),
+               Error);
   KeptColumns sink;
-  EXPECT_THROW(compliance_columns(k, factor, stiffness_norm(k), nodes, memory(1000), sink), Error);
+  EXPECT_THROW(
+      columns::compliance_columns(k, factor, linalg::stiffness_norm(k), nodes, memory(1000), sink),
+      Error);
   EXPECT_TRUE(sink.kept.empty());
-  EXPECT_EQ(compliance_columns(k, factor, stiffness_norm(k), {}, {}, sink), 0);
+  EXPECT_EQ(columns::compliance_columns(k, factor, linalg::stiffness_norm(k), {}, {}, sink), 0);
 }
 
 } // namespace

@@ -22,10 +22,10 @@ namespace {
 /// A front with numbers whose pivots are positive.
 struct MadeFront {
   std::vector<double> l, update;
-  FrontArrays arrays;
+  cholesky::FrontArrays arrays;
 
   MadeFront(std::size_t columns, std::size_t below)
-      : l(random_vector(front_offset(columns + below, columns), 1)),
+      : l(random_vector(cholesky::front_offset(columns + below, columns), 1)),
         update(random_vector(below * (below + 1) / 2, 2)) {
     arrays = {columns + below, columns, l.data(), update.data()};
     for (std::size_t c = 0; c < columns; ++c)
@@ -33,7 +33,7 @@ struct MadeFront {
   }
 };
 
-void plainly(const FrontArrays& f) {
+void plainly(const cholesky::FrontArrays& f) {
   for (std::size_t c = 0; c < f.rows; ++c)
     for (std::size_t r = c; r < f.rows; ++r) {
       double& entry = f.column(c)[r];
@@ -45,13 +45,14 @@ void plainly(const FrontArrays& f) {
 }
 
 /// As the factorisation does it, strips in `parts`.
-void by_kernel(const FrontKernel& kernel, const FrontArrays& f, std::size_t parts) {
-  std::vector<double> square(kernel.square_size(front_block)),
-      strips(kernel.strips_size(f.rows, std::min(f.columns, front_block)));
-  const FrontScratch scratch{square.data(), strips.data()};
+void by_kernel(const cholesky::FrontKernel& kernel, const cholesky::FrontArrays& f,
+               std::size_t parts) {
+  std::vector<double> square(kernel.square_size(cholesky::front_block)),
+      strips(kernel.strips_size(f.rows, std::min(f.columns, cholesky::front_block)));
+  const cholesky::FrontScratch scratch{square.data(), strips.data()};
   const std::vector<double> min_pivot(f.columns);
-  for (std::size_t begin = 0; begin < f.columns; begin += front_block) {
-    const std::size_t count = std::min(front_block, f.columns - begin);
+  for (std::size_t begin = 0; begin < f.columns; begin += cholesky::front_block) {
+    const std::size_t count = std::min(cholesky::front_block, f.columns - begin);
     ASSERT_EQ(kernel.eliminate(f, begin, count, min_pivot.data(), scratch), count);
     const std::size_t all = kernel.strips(f.rows - begin - count);
     for (std::size_t p = 0; p < parts; ++p)
@@ -66,12 +67,12 @@ bool has_avx2() {
 }
 
 /// Those that this processor can run.
-std::vector<const FrontKernel*> kernels() {
-  std::vector<const FrontKernel*> all{&front_kernel_baseline};
+std::vector<const cholesky::FrontKernel*> kernels() {
+  std::vector<const cholesky::FrontKernel*> all{&cholesky::front_kernel_baseline};
   if (has_avx2())
-    all.push_back(&front_kernel_avx2);
+    all.push_back(&cholesky::front_kernel_avx2);
   if (best_cpu_level() == CpuLevel::avx512)
-    all.push_back(&front_kernel_avx512);
+    all.push_back(&cholesky::front_kernel_avx512);
   return all;
 }
 
@@ -94,7 +95,7 @@ TEST(FrontKernel, IsAPlainTripleLoopAtEverySizeAndLevel) {
                                                         {300, 100}}) {
     MadeFront plain(columns, below);
     plainly(plain.arrays);
-    for (const FrontKernel* kernel : kernels()) {
+    for (const cholesky::FrontKernel* kernel : kernels()) {
       for (const std::size_t parts : std::array<std::size_t, 2>{1, 3}) {
         MadeFront made(columns, below);
         by_kernel(*kernel, made.arrays, parts);
@@ -110,7 +111,7 @@ TEST(FrontKernel, IsAPlainTripleLoopAtEverySizeAndLevel) {
 
 /// Runs of all lengths up to 17 and gaps between them, over columns and what is below them.
 TEST(FrontKernel, AddsAChildAtItsRowsAtEveryLevel) {
-  std::vector<FrontRun> runs;
+  std::vector<cholesky::FrontRun> runs;
   std::vector<std::size_t> row; // of the front, by that of the child
   std::size_t rows = 2;
   for (std::size_t length = 1; length <= 17; ++length) {
@@ -126,7 +127,7 @@ TEST(FrontKernel, AddsAChildAtItsRowsAtEveryLevel) {
   for (std::size_t c = 0; c < below; ++c)
     for (std::size_t r = c; r < below; ++r)
       plain.arrays.column(row[c])[row[r]] += update[at++];
-  for (const FrontKernel* kernel : kernels())
+  for (const cholesky::FrontKernel* kernel : kernels())
     for (const std::size_t at_once : std::array<std::size_t, 3>{1, 16, 1000}) {
       MadeFront made(columns, rows - columns);
       for (std::size_t first = 0; first < rows; first += at_once)
@@ -138,7 +139,7 @@ TEST(FrontKernel, AddsAChildAtItsRowsAtEveryLevel) {
 }
 
 /// Columns of all rows, one behind the other: one supernode, however wide.
-std::vector<double> square_columns(const FrontArrays& f) {
+std::vector<double> square_columns(const cholesky::FrontArrays& f) {
   std::vector<double> l(f.rows * f.columns);
   for (std::size_t c = 0; c < f.columns; ++c)
     std::copy_n(f.column(c) + c, f.rows - c, l.data() + c * f.rows + c);
@@ -165,7 +166,7 @@ struct MadeFactor {
     std::iota(s.begin() + n, s.end(), c);
     blocks = {first.data(), second.data()};
   }
-  SupernodalArrays arrays() const {
+  linalg::SupernodalArrays arrays() const {
     return {2, super.data(), pi.data(), nullptr, s.data(), nullptr, blocks.data()};
   }
   /// L of row r and column c.
@@ -217,7 +218,7 @@ TEST(SupernodalSolve, IsPlainSubstitutionAtEverySizeWidthAndLevel) {
         if (cpu > best_cpu_level())
           continue;
         std::vector<double> solved = x, work(below * width);
-        solve_supernodal(cpu)(l.arrays(), solved.data(), width, work.data());
+        linalg::solve_supernodal(cpu)(l.arrays(), solved.data(), width, work.data());
         EXPECT_EQ(std::memcmp(solved.data(), plain.data(), 8 * solved.size()), 0)
             << columns << " + " << below << ", " << width << " wide, " << cpu_level_name(cpu);
       }

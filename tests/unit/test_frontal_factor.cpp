@@ -26,7 +26,7 @@ using namespace gewebe::test;
 
 namespace {
 
-Model round_organ(int rounds) {
+model::Model round_organ(int rounds) {
   return model_of(sphere_mesh(rounds, 20, {1, 2, 3}));
 }
 
@@ -39,14 +39,14 @@ std::vector<double> loads(std::size_t count, unsigned seed) {
   return f;
 }
 
-std::vector<double> solved(const FrontalFactor& factor, std::vector<double> f) {
+std::vector<double> solved(const linalg::FrontalFactor& factor, std::vector<double> f) {
   factor.solve(f, f.size() / factor.axes());
   return f;
 }
 
 /// By a factor that shares no code with ours.
-std::vector<double> reference(const Model& model, const std::vector<double>& f) {
-  const StiffnessMatrix k = stiffness_matrix(model);
+std::vector<double> reference(const model::Model& model, const std::vector<double>& f) {
+  const linalg::StiffnessMatrix k = fem::stiffness_matrix(model);
   const auto n = static_cast<Eigen::Index>(k.order());
   std::vector<Eigen::Triplet<double>> entries;
   for (std::size_t c = 0; c < k.order(); ++c)
@@ -80,7 +80,7 @@ Context context_of(int threads, CpuLevel cpu = best_cpu_level()) {
 }
 
 /// The springs nearest to a node.
-std::vector<std::size_t> near(const Model& model, std::uint32_t node, std::size_t count) {
+std::vector<std::size_t> near(const model::Model& model, std::uint32_t node, std::size_t count) {
   std::vector<std::pair<double, std::size_t>> order;
   for (std::size_t e = 0; e < model.springs.size(); ++e) {
     const Vec3 d = model.nodes[model.springs[e].i].position - model.nodes[node].position;
@@ -94,14 +94,14 @@ std::vector<std::size_t> near(const Model& model, std::uint32_t node, std::size_
 }
 
 struct Doubled {
-  Model model;
+  model::Model model;
   std::vector<std::uint32_t> origin, place;
 };
 
 /// A node gets a copy that takes every second of its springs, and half of the central one.
-Doubled doubled(const Model& model, std::uint32_t node) {
+Doubled doubled(const model::Model& model, std::uint32_t node) {
   Doubled d{model, {}, {}};
-  const auto s = static_cast<std::uint32_t>(surface_count(model));
+  const auto s = static_cast<std::uint32_t>(model::surface_count(model));
   const auto n = static_cast<std::uint32_t>(model.nodes.size());
   d.model.nodes.insert(d.model.nodes.begin() + s, model.nodes[node]);
   for (std::uint32_t i = 0; i <= n; ++i)
@@ -110,13 +110,13 @@ Doubled doubled(const Model& model, std::uint32_t node) {
     d.place.push_back(i < s ? i : i + 1);
   d.model.springs.clear();
   std::size_t turn = 0;
-  for (Spring spring : model.springs) {
+  for (model::Spring spring : model.springs) {
     spring.i = d.place[spring.i];
     spring.j = d.place[spring.j];
     const bool here = spring.i == node || spring.j == node;
-    Spring other = spring;
+    model::Spring other = spring;
     std::uint32_t& end = other.i == node ? other.i : other.j;
-    if (here && spring.kind == SpringKind::central) {
+    if (here && spring.kind == model::SpringKind::central) {
       spring.stiffness /= 2;
       other.stiffness /= 2;
       end = s;
@@ -127,13 +127,14 @@ Doubled doubled(const Model& model, std::uint32_t node) {
     }
     d.model.springs.push_back(spring);
   }
-  for (Spring& spring : d.model.springs)
+  for (model::Spring& spring : d.model.springs)
     if (spring.i > spring.j)
       std::swap(spring.i, spring.j);
-  std::sort(d.model.springs.begin(), d.model.springs.end(), [](const Spring& a, const Spring& b) {
-    return std::tuple(a.kind, a.i, a.j) < std::tuple(b.kind, b.i, b.j);
-  });
-  for (Node& one : d.model.nodes)
+  std::sort(d.model.springs.begin(), d.model.springs.end(),
+            [](const model::Spring& a, const model::Spring& b) {
+              return std::tuple(a.kind, a.i, a.j) < std::tuple(b.kind, b.i, b.j);
+            });
+  for (model::Node& one : d.model.nodes)
     if (one.central >= 0)
       one.central = static_cast<std::int32_t>(d.place[static_cast<std::size_t>(one.central)]);
   return d;
@@ -143,11 +144,11 @@ Doubled doubled(const Model& model, std::uint32_t node) {
 
 TEST(FrontalFactor, SolvesAsAnyOther) {
   for (const bool partly : {false, true}) {
-    Model model = round_organ(4);
+    model::Model model = round_organ(4);
     if (partly)
       for (std::size_t i = 0; i < 300; ++i)
         model.nodes[7 * i].fixed = static_cast<std::uint8_t>(i % 8);
-    const FrontalFactor factor(model, Context{});
+    const linalg::FrontalFactor factor(model, Context{});
     const std::vector<double> f = loads(3 * model.nodes.size(), 1);
     EXPECT_LT(relative_difference(solved(factor, f), reference(model, f)), 1e-9);
     EXPECT_EQ(factor.work().computed, factor.work().fronts);
@@ -155,8 +156,8 @@ TEST(FrontalFactor, SolvesAsAnyOther) {
 }
 
 TEST(FrontalFactor, AllRightHandSidesAlike) {
-  const Model model = round_organ(3);
-  const FrontalFactor factor(model, Context{});
+  const model::Model model = round_organ(3);
+  const linalg::FrontalFactor factor(model, Context{});
   const std::size_t axes = factor.axes();
   const std::vector<double> f = loads(30 * axes, 2), all = solved(factor, f);
   for (const std::size_t c : std::array<std::size_t, 4>{0, 7, 24, 29}) {
@@ -168,22 +169,23 @@ TEST(FrontalFactor, AllRightHandSidesAlike) {
 }
 
 TEST(FrontalFactor, ThreadsAndProcessorsGiveTheSameBits) {
-  const Model model = round_organ(4);
+  const model::Model model = round_organ(4);
   const std::vector<double> f = loads(3 * model.nodes.size(), 3);
-  const std::vector<double> once = solved(FrontalFactor(model, context_of(1)), f);
-  EXPECT_TRUE(same_bits(once, solved(FrontalFactor(model, context_of(2)), f)));
-  EXPECT_TRUE(same_bits(once, solved(FrontalFactor(model, context_of(2, CpuLevel::baseline)), f)));
+  const std::vector<double> once = solved(linalg::FrontalFactor(model, context_of(1)), f);
+  EXPECT_TRUE(same_bits(once, solved(linalg::FrontalFactor(model, context_of(2)), f)));
+  EXPECT_TRUE(
+      same_bits(once, solved(linalg::FrontalFactor(model, context_of(2, CpuLevel::baseline)), f)));
 }
 
 TEST(FrontalFactor, FollowsStiffnessesAndComesBackToTheSameBits) {
-  const Model model = round_organ(4);
+  const model::Model model = round_organ(4);
   const std::vector<double> f = loads(3 * model.nodes.size(), 4);
-  FrontalFactor factor(model, Context{});
+  linalg::FrontalFactor factor(model, Context{});
   const std::vector<double> first = solved(factor, f);
-  Model other = model;
+  model::Model other = model;
   for (const std::size_t e : near(model, 100, 24))
     other.springs[e].stiffness *= 0.01;
-  const FrontalWork work = factor.refactor(other, {}, {}, Context{});
+  const cholesky::FrontalWork work = factor.refactor(other, {}, {}, Context{});
   EXPECT_GT(work.computed, 0u);
   EXPECT_LT(work.computed, work.fronts / 5) << "a local change";
   EXPECT_LT(work.operations, 0.7 * work.all_operations);
@@ -195,30 +197,30 @@ TEST(FrontalFactor, FollowsStiffnessesAndComesBackToTheSameBits) {
 }
 
 TEST(FrontalFactor, FollowsWhateverChangesARow) {
-  const Model model = round_organ(3);
+  const model::Model model = round_organ(3);
   const std::vector<double> f = loads(3 * model.nodes.size(), 4);
   const std::uint32_t node = 100;
   struct Change {
     const char* name;
-    void (*make)(Model&);
+    void (*make)(model::Model&);
   };
-  for (const Change& change :
-       std::vector<Change>{{"a rest length", [](Model& m) { m.springs[200].rest *= 0.5; }},
-                           {"a place",
-                            [](Model& m) {
-                              m.nodes[node].position += Vec3{0.02, 0.01, -0.03};
-                            }},
-                           {"an axis held", [](Model& m) { m.nodes[node].fixed = fixed_x; }},
-                           {"another axis held", [](Model& m) { m.nodes[node].fixed = fixed_z; }},
-                           {"a node held", [](Model& m) { m.nodes[node].fixed = fixed_all; }}}) {
-    Model before = model;
+  for (const Change& change : std::vector<Change>{
+           {"a rest length", [](model::Model& m) { m.springs[200].rest *= 0.5; }},
+           {"a place",
+            [](model::Model& m) {
+              m.nodes[node].position += Vec3{0.02, 0.01, -0.03};
+            }},
+           {"an axis held", [](model::Model& m) { m.nodes[node].fixed = model::fixed_x; }},
+           {"another axis held", [](model::Model& m) { m.nodes[node].fixed = model::fixed_z; }},
+           {"a node held", [](model::Model& m) { m.nodes[node].fixed = model::fixed_all; }}}) {
+    model::Model before = model;
     if (std::string(change.name) == "another axis held")
-      before.nodes[node].fixed = fixed_x;
-    Model after = before;
+      before.nodes[node].fixed = model::fixed_x;
+    model::Model after = before;
     change.make(after);
-    FrontalFactor factor(before, Context{});
+    linalg::FrontalFactor factor(before, Context{});
     const std::vector<double> first = solved(factor, f);
-    const FrontalWork work = factor.refactor(after, {}, {}, Context{});
+    const cholesky::FrontalWork work = factor.refactor(after, {}, {}, Context{});
     EXPECT_GT(work.computed, 0U) << change.name;
     EXPECT_LT(relative_difference(solved(factor, f), reference(after, f)), 1e-9) << change.name;
     EXPECT_GT(relative_difference(solved(factor, f), first), 1e-6) << change.name;
@@ -228,15 +230,15 @@ TEST(FrontalFactor, FollowsWhateverChangesARow) {
 }
 
 TEST(FrontalFactor, FollowsCutSprings) {
-  Model model = round_organ(3);
-  FrontalFactor factor(model, Context{});
+  model::Model model = round_organ(3);
+  linalg::FrontalFactor factor(model, Context{});
   std::mt19937 random(5);
   for (int cut = 0; cut < 20; ++cut) {
     for (const std::size_t e :
          near(model, static_cast<std::uint32_t>(random() % model.nodes.size()), 1 + random() % 5))
-      if (model.springs[e].kind != SpringKind::central)
+      if (model.springs[e].kind != model::SpringKind::central)
         model.springs[e].stiffness = 0;
-    std::erase_if(model.springs, [](const Spring& s) { return s.stiffness == 0; });
+    std::erase_if(model.springs, [](const model::Spring& s) { return s.stiffness == 0; });
     (void)factor.refactor(model, {}, {}, Context{});
     const std::vector<double> f = loads(3 * model.nodes.size(), 6);
     ASSERT_LT(relative_difference(solved(factor, f), reference(model, f)), 1e-8) << cut;
@@ -244,14 +246,15 @@ TEST(FrontalFactor, FollowsCutSprings) {
 }
 
 TEST(FrontalFactor, FollowsDoubledNodes) {
-  Model model = round_organ(4);
-  FrontalFactor factor(model, Context{});
+  model::Model model = round_organ(4);
+  linalg::FrontalFactor factor(model, Context{});
   std::mt19937 random(7);
   for (int cut = 0; cut < 20; ++cut) {
-    const Doubled now = doubled(model, static_cast<std::uint32_t>(random() % surface_count(model)));
+    const Doubled now =
+        doubled(model, static_cast<std::uint32_t>(random() % model::surface_count(model)));
     model = now.model;
-    ASSERT_NO_THROW(check_model(model));
-    const FrontalWork work = factor.refactor(model, now.origin, now.place, Context{});
+    ASSERT_NO_THROW(model::check_model(model));
+    const cholesky::FrontalWork work = factor.refactor(model, now.origin, now.place, Context{});
     EXPECT_LT(work.computed, work.fronts / 3);
     ASSERT_EQ(factor.axes(), 3 * model.nodes.size());
     const std::vector<double> f = loads(3 * model.nodes.size(), 8);
@@ -260,14 +263,14 @@ TEST(FrontalFactor, FollowsDoubledNodes) {
 }
 
 /// Nodes in a cube, each held by springs to its corners, with some springs between near ones.
-Model held_cloud(std::mt19937& random) {
+model::Model held_cloud(std::mt19937& random) {
   std::uniform_real_distribution<double> uniform(0.1, 0.9);
-  Model model;
+  model::Model model;
   model.materials.emplace_back();
   for (unsigned k = 0; k < 8; ++k)
     model.nodes.push_back({.position = {k & 1 ? 1.0 : 0.0, k & 2 ? 1.0 : 0.0, k & 4 ? 1.0 : 0.0},
                            .mass = 1,
-                           .fixed = fixed_all});
+                           .fixed = model::fixed_all});
   for (int k = 0; k < 60; ++k)
     model.nodes.push_back(
         {.position = {uniform(random), uniform(random), uniform(random)}, .mass = 1});
@@ -275,7 +278,7 @@ Model held_cloud(std::mt19937& random) {
     for (std::uint32_t j = std::max(i + 1, 8U); j < model.nodes.size(); ++j) {
       const double length = norm(model.nodes[i].position - model.nodes[j].position);
       if (i < 8 || length < 0.25)
-        model.springs.push_back({i, j, SpringKind::edge, 1 + length, 0, length});
+        model.springs.push_back({i, j, model::SpringKind::edge, 1 + length, 0, length});
     }
   return model;
 }
@@ -285,9 +288,10 @@ TEST(FrontalFactor, FollowsSpringsThenNodes) {
   // have lost a child that reached it by those springs alone, though none of its rows has changed.
   std::mt19937 random(1);
   for (int round = 0; round < 200; ++round) {
-    Model model = held_cloud(random);
-    FrontalFactor factor(model, Context{});
-    std::erase_if(model.springs, [&](const Spring& s) { return s.i >= 8 && random() % 3 == 0; });
+    model::Model model = held_cloud(random);
+    linalg::FrontalFactor factor(model, Context{});
+    std::erase_if(model.springs,
+                  [&](const model::Spring& s) { return s.i >= 8 && random() % 3 == 0; });
     (void)factor.refactor(model, {}, {}, Context{});
     const Doubled next = doubled(model, static_cast<std::uint32_t>(8 + random() % 60));
     (void)factor.refactor(next.model, next.origin, next.place, Context{});
@@ -297,33 +301,33 @@ TEST(FrontalFactor, FollowsSpringsThenNodes) {
 }
 
 TEST(FrontalFactor, NamesTheAxisOfAPivotThatVanishes) {
-  Model model = round_organ(3);
-  FrontalFactor factor(model, Context{});
-  std::erase_if(model.springs, [](const Spring& s) { return s.i == 11 || s.j == 11; });
+  model::Model model = round_organ(3);
+  linalg::FrontalFactor factor(model, Context{});
+  std::erase_if(model.springs, [](const model::Spring& s) { return s.i == 11 || s.j == 11; });
   try {
     (void)factor.refactor(model, {}, {}, Context{});
     FAIL() << "node 11 hangs at nothing";
-  } catch (const NotPositiveDefinite& error) {
+  } catch (const linalg::NotPositiveDefinite& error) {
     EXPECT_EQ(error.row() / 3, 11u);
   }
 }
 
 TEST(FrontalFactor, RefusesWhatDoesNotFit) {
-  const Model model = round_organ(3);
+  const model::Model model = round_organ(3);
   Context context;
   context.max_memory = 100000;
-  EXPECT_THROW(FrontalFactor(model, context), Error);
-  Model fixed = model;
-  for (Node& node : fixed.nodes)
-    node.fixed = fixed_all;
-  EXPECT_THROW(FrontalFactor(fixed, Context{}), Error);
+  EXPECT_THROW(linalg::FrontalFactor(model, context), Error);
+  model::Model fixed = model;
+  for (model::Node& node : fixed.nodes)
+    node.fixed = model::fixed_all;
+  EXPECT_THROW(linalg::FrontalFactor(fixed, Context{}), Error);
 }
 
 TEST(FrontalFactor, FollowsNodesThatAreGone) {
-  const Model model = round_organ(3);
-  FrontalFactor factor(model, Context{});
+  const model::Model model = round_organ(3);
+  linalg::FrontalFactor factor(model, Context{});
   // Without node 5 and its springs, and what was drawn with it.
-  Model less = model;
+  model::Model less = model;
   std::vector<std::uint32_t> origin, place;
   for (std::uint32_t i = 0; i < model.nodes.size(); ++i) {
     place.push_back(i < 5 ? i : i == 5 ? UINT32_MAX : i - 1);
@@ -331,21 +335,21 @@ TEST(FrontalFactor, FollowsNodesThatAreGone) {
       origin.push_back(i);
   }
   less.nodes.erase(less.nodes.begin() + 5);
-  std::erase_if(less.springs, [](const Spring& s) { return s.i == 5 || s.j == 5; });
-  for (Spring& s : less.springs) {
+  std::erase_if(less.springs, [](const model::Spring& s) { return s.i == 5 || s.j == 5; });
+  for (model::Spring& s : less.springs) {
     s.i = place[s.i];
     s.j = place[s.j];
   }
-  const FrontalWork work = factor.refactor(less, origin, place, Context{});
+  const cholesky::FrontalWork work = factor.refactor(less, origin, place, Context{});
   EXPECT_LT(work.computed, work.fronts);
   const std::vector<double> f = loads(3 * less.nodes.size(), 9);
   EXPECT_LT(relative_difference(solved(factor, f), reference(less, f)), 1e-9);
 }
 
 TEST(FrontalFactor, ForwardSolvesGiveBlocksOfTheCompliance) {
-  Model model = round_organ(4);
-  model.nodes[70].fixed = fixed_y;
-  model.nodes[71].fixed = fixed_all;
+  model::Model model = round_organ(4);
+  model.nodes[70].fixed = model::fixed_y;
+  model.nodes[71].fixed = model::fixed_all;
   const std::size_t axes = 3 * model.nodes.size();
   const std::vector<std::uint32_t> nodes{0,
                                          5,
@@ -359,14 +363,14 @@ TEST(FrontalFactor, ForwardSolvesGiveBlocksOfTheCompliance) {
                                          600,
                                          static_cast<std::uint32_t>(model.nodes.size() - 1)};
   for (const CpuLevel cpu : {CpuLevel::baseline, best_cpu_level()}) {
-    const FrontalFactor factor(model, context_of(1, cpu));
+    const linalg::FrontalFactor factor(model, context_of(1, cpu));
     const auto solutions = factor.forward_solves(nodes);
     ASSERT_EQ(solutions.size(), nodes.size());
     for (std::size_t k = 0; k < nodes.size(); ++k) {
       std::vector<double> columns(3 * axes);
       for (std::size_t a = 0; a < 3; ++a)
         columns[a * axes + 3 * std::size_t{nodes[k]} + a] = 1;
-      factorise_axes(model, Context{}).solve(columns, 3);
+      compliance::factorise_axes(model, Context{}).solve(columns, 3);
       double size = 0;
       for (const double value : columns)
         size = test::larger(size, std::abs(value));
@@ -389,16 +393,16 @@ TEST(FrontalFactor, ForwardSolvesGiveBlocksOfTheCompliance) {
 namespace {
 
 /// C f at these nodes, of the load that the factor carries.
-std::vector<double> carried_at(const FrontalFactor& factor,
+std::vector<double> carried_at(const linalg::FrontalFactor& factor,
                                const std::vector<std::uint32_t>& nodes) {
   std::vector<double> u;
-  for (const FrontalFactor::ForwardSolve& at : factor.forward_solves(nodes))
+  for (const linalg::FrontalFactor::ForwardSolve& at : factor.forward_solves(nodes))
     for (const double value : factor.carried(at))
       u.push_back(value);
   return u;
 }
 
-std::vector<double> solved_at(const FrontalFactor& factor, const std::vector<double>& f,
+std::vector<double> solved_at(const linalg::FrontalFactor& factor, const std::vector<double>& f,
                               const std::vector<std::uint32_t>& nodes) {
   const std::vector<double> all = solved(factor, f);
   std::vector<double> u;
@@ -413,11 +417,12 @@ std::vector<double> solved_at(const FrontalFactor& factor, const std::vector<dou
 TEST(FrontalFactor, ALoadThatIsCarriedAlongFollowsTheFactorAndItself) {
   for (const CpuLevel cpu : {CpuLevel::baseline, best_cpu_level()}) {
     const Context context = context_of(1, cpu);
-    Model model = round_organ(4);
-    model.nodes[70].fixed = fixed_y;
-    model.nodes[71].fixed = fixed_all;
+    model::Model model = round_organ(4);
+    model.nodes[70].fixed = model::fixed_y;
+    model.nodes[71].fixed = model::fixed_all;
     const std::vector<std::uint32_t> nodes{0, 5, 70, 71, 300, 500};
-    FrontalFactor factor(model, context), twin(model, context); // which begins anew at the end
+    linalg::FrontalFactor factor(model, context),
+        twin(model, context); // which begins anew at the end
     std::vector<double> f = loads(3 * model.nodes.size(), 9);
     EXPECT_EQ(factor.carry(f), factor.work().fronts);
     EXPECT_LT(relative_difference(carried_at(factor, nodes), solved_at(factor, f, nodes)), 1e-12);
@@ -429,7 +434,7 @@ TEST(FrontalFactor, ALoadThatIsCarriedAlongFollowsTheFactorAndItself) {
     EXPECT_LT(relative_difference(carried_at(factor, nodes), solved_at(factor, f, nodes)), 1e-12);
     std::mt19937 random(7);
     for (int cut = 0; cut < 12; ++cut) {
-      FrontalWork work;
+      cholesky::FrontalWork work;
       if (cut % 3 == 1) { // springs alone: the tree stays
         for (const std::size_t e : near(model, static_cast<std::uint32_t>(random() % 600), 8))
           model.springs[e].stiffness *= 0.5;
@@ -461,19 +466,19 @@ TEST(FrontalFactor, ALoadThatIsCarriedAlongFollowsTheFactorAndItself) {
 }
 
 TEST(FrontalFactor, TheWeakestAxisIsThatOfWhatHangsLoosely) {
-  Model model = round_organ(3);
+  model::Model model = round_organ(3);
   const std::uint32_t loose = 40;
-  for (Spring& s : model.springs)
+  for (model::Spring& s : model.springs)
     if (s.i == loose || s.j == loose)
       s.stiffness *= 1e-9;
-  const FrontalFactor factor(model, Context{});
+  const linalg::FrontalFactor factor(model, Context{});
   EXPECT_LT(factor.weakest_pivot(), 1); // its own diagonal is as weak
-  Model hinge = round_organ(3);
+  model::Model hinge = round_organ(3);
   int kept = 0;
-  for (Spring& s : hinge.springs)
+  for (model::Spring& s : hinge.springs)
     if ((s.i == loose || s.j == loose) && ++kept > 1)
       s.stiffness *= 1e-8;
-  const FrontalFactor weak(hinge, Context{});
+  const linalg::FrontalFactor weak(hinge, Context{});
   EXPECT_LT(weak.weakest_pivot(), 1e-6);
   EXPECT_EQ(weak.weakest_axis() / 3, loose);
 }

@@ -17,9 +17,9 @@ using namespace gewebe;
 namespace {
 
 /// A scan of `value` (of a place in the world) on a lattice of `spacing`, turned about z.
-GreyVolume scan_of(const Int3& size, const Vec3& spacing, double angle,
-                   const std::function<double(const Vec3&)>& value) {
-  GreyVolume scan;
+labels::GreyVolume scan_of(const Int3& size, const Vec3& spacing, double angle,
+                           const std::function<double(const Vec3&)>& value) {
+  labels::GreyVolume scan;
   scan.size = size;
   const double c = std::cos(angle), s = std::sin(angle);
   scan.transform.m = {
@@ -32,20 +32,20 @@ GreyVolume scan_of(const Int3& size, const Vec3& spacing, double angle,
   return scan;
 }
 
-Vec3 middle_of(const GreyVolume& scan) {
+Vec3 middle_of(const labels::GreyVolume& scan) {
   return scan.transform.to_world(
       {(scan.size[0] - 1) / 2.0, (scan.size[1] - 1) / 2.0, (scan.size[2] - 1) / 2.0});
 }
 
-GreyDensityOptions above(double low) {
-  GreyDensityOptions options;
+labels::GreyDensityOptions above(double low) {
+  labels::GreyDensityOptions options;
   options.low = low;
   return options;
 }
 
-std::string message(const GreyVolume& scan, const GreyDensityOptions& options) {
+std::string message(const labels::GreyVolume& scan, const labels::GreyDensityOptions& options) {
   try {
-    (void)grey_density({}, scan, options);
+    (void)labels::grey_density({}, scan, options);
   } catch (const Error& error) {
     return error.what();
   }
@@ -66,16 +66,16 @@ TEST(GreyDensity, PlanesAreExact) {
   const Vec3 slope{20, -7, 11};
   for (const Vec3& spacing : {Vec3{1, 1, 1}, Vec3{0.75, 0.75, 2.5}}) {
     for (const double finer : {1.0, 0.4}) {
-      const GreyVolume scan =
+      const labels::GreyVolume scan =
           scan_of({20, 18, 14}, spacing, 0.3, [&](const Vec3& p) { return dot(slope, p) - 40; });
-      GreyDensityOptions options = above(dot(slope, middle_of(scan)) - 40 + 1.25);
+      labels::GreyDensityOptions options = above(dot(slope, middle_of(scan)) - 40 + 1.25);
       const double edge = spacing.x;
       options.voxel = finer * edge;
-      GreyDensityReport report;
-      const Grid grid = grey_density({}, scan, options, &report);
+      labels::GreyDensityReport report;
+      const volume::Grid grid = labels::grey_density({}, scan, options, &report);
       EXPECT_TRUE(grid.info().transform.is_cubic());
-      const TriangleMesh mesh = marching_cubes({}, grid).mesh;
-      EXPECT_TRUE(examine_mesh(mesh).closed());
+      const TriangleMesh mesh = surface::marching_cubes({}, grid).mesh;
+      EXPECT_TRUE(mesh::examine_mesh(mesh).closed());
       double largest = 0;
       std::size_t inner = 0;
       for (const Vec3& p : mesh.points) {
@@ -98,15 +98,17 @@ TEST(GreyDensity, PlanesAreExact) {
 
 TEST(GreyDensity, WhatIsFarFromTheSurfaceMovesNothing) {
   const auto ball = [](const Vec3& p) { return 10 - norm(p - Vec3{4, 15, 14}); };
-  const GreyVolume plain = scan_of({28, 28, 28}, {1, 1, 1}, 0, ball);
-  const GreyVolume metal = scan_of({28, 28, 28}, {1, 1, 1}, 0, [&](const Vec3& p) {
+  const labels::GreyVolume plain = scan_of({28, 28, 28}, {1, 1, 1}, 0, ball);
+  const labels::GreyVolume metal = scan_of({28, 28, 28}, {1, 1, 1}, 0, [&](const Vec3& p) {
     return ball(p) > 4 ? 3000 : ball(p) < -4 ? -2000 : ball(p);
   });
-  GreyDensityReport report;
-  const TriangleMesh a = marching_cubes({}, grey_density({}, plain, above(0.5), &report)).mesh;
+  labels::GreyDensityReport report;
+  const TriangleMesh a =
+      surface::marching_cubes({}, labels::grey_density({}, plain, above(0.5), &report)).mesh;
   EXPECT_GT(report.width, 0.8); // neighbours of the surface are within a voxel's diagonal of it
   EXPECT_LT(report.width, 1.75);
-  const TriangleMesh b = marching_cubes({}, grey_density({}, metal, above(0.5))).mesh;
+  const TriangleMesh b =
+      surface::marching_cubes({}, labels::grey_density({}, metal, above(0.5))).mesh;
   EXPECT_EQ(a.points, b.points);
   EXPECT_EQ(a.triangles, b.triangles);
   EXPECT_NEAR(volume_of(a) / (4.0 / 3 * std::numbers::pi * 9.5 * 9.5 * 9.5), 1, 0.01); // chords
@@ -114,59 +116,64 @@ TEST(GreyDensity, WhatIsFarFromTheSurfaceMovesNothing) {
 
 // Between two thresholds, and below one, the rest: volumes add up.
 TEST(GreyDensity, TwoThresholdsBoundAShell) {
-  const GreyVolume scan = scan_of({30, 30, 16}, {1, 1, 2}, 0.2, [](const Vec3&) { return 0.0; });
-  GreyVolume ball = scan;
+  const labels::GreyVolume scan =
+      scan_of({30, 30, 16}, {1, 1, 2}, 0.2, [](const Vec3&) { return 0.0; });
+  labels::GreyVolume ball = scan;
   const Vec3 centre = middle_of(scan);
   ball = scan_of({30, 30, 16}, {1, 1, 2}, 0.2,
                  [&](const Vec3& p) { return 100 - 10 * norm(p - centre); });
-  GreyDensityOptions shell = above(-10);
+  labels::GreyDensityOptions shell = above(-10);
   shell.high = 50;
-  const double between = volume_of(marching_cubes({}, grey_density({}, ball, shell)).mesh);
-  const double outer = volume_of(marching_cubes({}, grey_density({}, ball, above(-10))).mesh);
-  const double inner = volume_of(marching_cubes({}, grey_density({}, ball, above(50))).mesh);
+  const double between =
+      volume_of(surface::marching_cubes({}, labels::grey_density({}, ball, shell)).mesh);
+  const double outer =
+      volume_of(surface::marching_cubes({}, labels::grey_density({}, ball, above(-10))).mesh);
+  const double inner =
+      volume_of(surface::marching_cubes({}, labels::grey_density({}, ball, above(50))).mesh);
   EXPECT_NEAR(between / (outer - inner), 1, 1e-3);
   EXPECT_NEAR(outer / (4.0 / 3 * std::numbers::pi * 11 * 11 * 11), 1, 0.01);
 }
 
 TEST(GreyDensity, VoxelsWithoutAValueAreOutside) {
-  GreyVolume scan = scan_of({12, 12, 12}, {1, 1, 1}, 0, [](const Vec3& p) {
+  labels::GreyVolume scan = scan_of({12, 12, 12}, {1, 1, 1}, 0, [](const Vec3& p) {
     return norm(p - Vec3{-2, 10, 8}) < 4 ? 60.0 : 10.0;
   });
   scan.values[scan.row(5, 5) + 6] = NAN; // in the middle
   scan.values[0] = NAN;
-  GreyDensityReport report;
-  const Grid grid = grey_density({}, scan, above(35), &report);
+  labels::GreyDensityReport report;
+  const volume::Grid grid = labels::grey_density({}, scan, above(35), &report);
   EXPECT_EQ(report.missing, 2U);
   EXPECT_EQ(report.min, 10);
   EXPECT_EQ(report.max, 60);
   EXPECT_EQ(report.width, 25);
-  GridAccessor value(grid);
+  volume::GridAccessor value(grid);
   EXPECT_EQ(value.value({6, 5, 5}), 0);
   EXPECT_EQ(value.value({6, 5, 6}), 1);
-  EXPECT_TRUE(std::isfinite(volume_of(marching_cubes({}, grid).mesh)));
+  EXPECT_TRUE(std::isfinite(volume_of(surface::marching_cubes({}, grid).mesh)));
 }
 
 TEST(GreyDensity, WhatHasNoSurfaceIsRefused) {
-  const GreyVolume scan =
+  const labels::GreyVolume scan =
       scan_of({6, 6, 6}, {1, 1, 1}, 0, [](const Vec3& p) { return p.x < -5 ? 200.0 : -100.0; });
   EXPECT_EQ(message(scan, above(200)),
             "no voxel lies within the thresholds; values go from -100 to 200");
   EXPECT_EQ(message(scan, above(-101)),
             "every voxel lies within the thresholds; values go from -100 to 200");
-  GreyVolume empty = scan;
+  labels::GreyVolume empty = scan;
   for (float& v : empty.values)
     v = NAN;
   EXPECT_EQ(message(empty, above(0)), "no voxel has a value");
-  GreyVolume oblique = scan;
+  labels::GreyVolume oblique = scan;
   oblique.transform.m[1] = 0.5;
   EXPECT_NE(message(oblique, above(0)).find("the axes are oblique"), std::string::npos);
   Context little;
   little.max_memory = 1000;
-  EXPECT_THROW((void)grey_density(little, scan, above(0)), Error);
+  EXPECT_THROW((void)labels::grey_density(little, scan, above(0)), Error);
   // The same bytes by any number of threads.
   Context one;
   one.threads = 1;
   Context two;
   two.threads = 2;
-  EXPECT_EQ(grey_density(one, scan, above(0)).digest(), grey_density(two, scan, above(0)).digest());
+  EXPECT_EQ(labels::grey_density(one, scan, above(0)).digest(),
+            labels::grey_density(two, scan, above(0)).digest());
 }

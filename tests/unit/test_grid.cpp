@@ -19,7 +19,7 @@ TEST(GridTransform, InverseComesBack) {
   std::mt19937 random(1);
   std::uniform_real_distribution<double> unit(-1, 1);
   for (int n = 0; n < 200; ++n) {
-    GridTransform transform;
+    volume::GridTransform transform;
     for (double& value : transform.m)
       value = unit(random);
     if (std::fabs(transform.determinant()) < 0.05)
@@ -30,17 +30,17 @@ TEST(GridTransform, InverseComesBack) {
 }
 
 TEST(GridTransform, CubicMeansEqualEdgesAtRightAngles) {
-  EXPECT_TRUE(uniform_transform(0.1).is_cubic());
-  GridTransform rotated;
+  EXPECT_TRUE(volume::uniform_transform(0.1).is_cubic());
+  volume::GridTransform rotated;
   rotated.m = {0.6, -0.8, 0, 5, 0.8, 0.6, 0, 5, 0, 0, -1, 5}; // mirrored too
   EXPECT_TRUE(rotated.is_cubic());
-  GridTransform stretched = uniform_transform(1);
+  volume::GridTransform stretched = volume::uniform_transform(1);
   stretched.m[10] = 1.001;
   EXPECT_FALSE(stretched.is_cubic());
-  GridTransform sheared = uniform_transform(1);
+  volume::GridTransform sheared = volume::uniform_transform(1);
   sheared.m[1] = 0.001;
   EXPECT_FALSE(sheared.is_cubic());
-  GridTransform broken = uniform_transform(1);
+  volume::GridTransform broken = volume::uniform_transform(1);
   broken.m[0] = NAN;
   EXPECT_FALSE(broken.is_cubic());
 }
@@ -48,36 +48,36 @@ TEST(GridTransform, CubicMeansEqualEdgesAtRightAngles) {
 TEST(GridTransform, SameLatticeAllowsRoundingOnly) {
   const Int3 min{-1000, -1000, -1000};
   const Int3 max{1000, 1000, 1000};
-  const GridTransform a = uniform_transform(0.1);
-  GridTransform b = a;
+  const volume::GridTransform a = volume::uniform_transform(0.1);
+  volume::GridTransform b = a;
   b.m[3] = 1e-12;
-  EXPECT_TRUE(same_lattice(a, b, min, max));
+  EXPECT_TRUE(volume::same_lattice(a, b, min, max));
   b.m[3] = 0.05;
-  EXPECT_FALSE(same_lattice(a, b, min, max));
-  b = uniform_transform(0.1 * (1 + 1e-8)); // 1e-5 voxels at the corners
-  EXPECT_FALSE(same_lattice(a, b, min, max));
+  EXPECT_FALSE(volume::same_lattice(a, b, min, max));
+  b = volume::uniform_transform(0.1 * (1 + 1e-8)); // 1e-5 voxels at the corners
+  EXPECT_FALSE(volume::same_lattice(a, b, min, max));
 }
 
 TEST(Grid, BuildsAndAnswersForNegativeIndicesLeavesAndTiles) {
-  GridInfo info;
-  info.transform = uniform_transform(2);
-  GridBuilder builder(info);
+  volume::GridInfo info;
+  info.transform = volume::uniform_transform(2);
+  volume::GridBuilder builder(info);
   const std::vector<Int3> origins{{-8, -16, 0}, {0, 0, 0}};
-  const std::vector<LeafRef> refs = builder.add_leaves({}, origins);
-  refs[0].values[leaf_offset({-1, -9, 7})] = 3;
-  refs[0].active[leaf_offset({-1, -9, 7}) / 64] |= std::uint64_t{1}
-                                                   << (leaf_offset({-1, -9, 7}) % 64);
-  for (int n = 0; n < leaf_voxels; ++n)
+  const std::vector<volume::LeafRef> refs = builder.add_leaves({}, origins);
+  refs[0].values[volume::leaf_offset({-1, -9, 7})] = 3;
+  refs[0].active[volume::leaf_offset({-1, -9, 7}) / 64] |=
+      std::uint64_t{1} << (volume::leaf_offset({-1, -9, 7}) % 64);
+  for (int n = 0; n < volume::leaf_voxels; ++n)
     refs[1].values[n] = 0.25F;
   for (int word = 0; word < 8; ++word)
     refs[1].active[word] = ~std::uint64_t{0};
   builder.add_tile({{128, 128, -128}, 128, 1, true});
   builder.add_tile({{4096, 0, 0}, 4096, 0.5F, true});
-  const Grid grid = builder.finish();
+  const volume::Grid grid = builder.finish();
 
   EXPECT_EQ(grid.leaves().size(), 1U); // the constant, wholly active leaf became a tile
   EXPECT_EQ(grid.tiles().size(), 3U);
-  GridAccessor accessor(grid);
+  volume::GridAccessor accessor(grid);
   EXPECT_EQ(accessor.value({-1, -9, 7}), 3);
   EXPECT_EQ(accessor.value({-1, -9, 6}), 0);
   EXPECT_EQ(accessor.value({7, 7, 7}), 0.25F);
@@ -92,26 +92,26 @@ TEST(Grid, BuildsAndAnswersForNegativeIndicesLeavesAndTiles) {
 }
 
 TEST(Grid, SharedLeafKeepsItsValues) {
-  GridBuilder first(GridInfo{});
+  volume::GridBuilder first(volume::GridInfo{});
   const Int3 origin{16, 0, -8};
-  const LeafRef leaf = first.add_leaves({}, {&origin, 1}).at(0);
-  for (int n = 0; n < leaf_voxels; ++n)
+  const volume::LeafRef leaf = first.add_leaves({}, {&origin, 1}).at(0);
+  for (int n = 0; n < volume::leaf_voxels; ++n)
     leaf.values[n] = static_cast<float>(n);
-  const Grid a = first.finish();
-  GridBuilder second(GridInfo{});
+  const volume::Grid a = first.finish();
+  volume::GridBuilder second(volume::GridInfo{});
   second.share_leaf(a, a.leaves().at(0));
-  const Grid b = second.finish();
+  const volume::Grid b = second.finish();
   EXPECT_EQ(a.digest(), b.digest());
-  EXPECT_THROW(second.share_leaf(a, LeafView{{80, 0, 0}, nullptr, nullptr}), Error);
+  EXPECT_THROW(second.share_leaf(a, volume::LeafView{{80, 0, 0}, nullptr, nullptr}), Error);
 }
 
 TEST(VolumeStats, CountsLeavesAndTiles) {
-  GridInfo info;
-  info.transform = uniform_transform(0.5);
-  GridBuilder builder(info);
+  volume::GridInfo info;
+  info.transform = volume::uniform_transform(0.5);
+  volume::GridBuilder builder(info);
   builder.add_tile({{0, 0, 0}, 8, 1, true});
   builder.add_tile({{8, 0, 0}, 8, 0.25F, true});
-  const VolumeStats stats = volume_stats({}, builder.finish());
+  const volume::VolumeStats stats = volume::volume_stats({}, builder.finish());
   EXPECT_EQ(stats.active_voxels, 1024U);
   EXPECT_EQ(stats.inside_voxels, 512U);
   EXPECT_DOUBLE_EQ(stats.volume, 512 * 1.25 / 8);
@@ -120,7 +120,7 @@ TEST(VolumeStats, CountsLeavesAndTiles) {
   EXPECT_EQ(stats.max, 1);
   EXPECT_EQ(stats.box.min, (Vec3{-0.25, -0.25, -0.25}));
   EXPECT_EQ(stats.box.max, (Vec3{7.75, 3.75, 3.75}));
-  EXPECT_TRUE(volume_stats({}, Grid()).box.empty());
+  EXPECT_TRUE(volume::volume_stats({}, volume::Grid()).box.empty());
 }
 
 TEST(ZeroPages, AreZeroAlignedAndMovable) {
@@ -143,25 +143,25 @@ TEST(ZeroPages, AreZeroAlignedAndMovable) {
 
 TEST(Grid, PruneMakesTilesOfConstantLeavesAndOfBlocksOfThem) {
   for (const float background : {0.0F, 2.0F}) {
-    GridInfo info;
+    volume::GridInfo info;
     info.background = background;
-    GridBuilder builder(info);
+    volume::GridBuilder builder(info);
     std::vector<Int3> origins;
     for (std::int32_t i = 0; i < 128; i += 8)
       for (std::int32_t j = 0; j < 128; j += 8)
         for (std::int32_t k = 0; k < 128; k += 8)
           origins.push_back({i, j, k});
     origins.insert(origins.end(), {{-8, 0, 0}, {-16, 0, 0}, {-24, 0, 0}});
-    const std::vector<LeafRef> refs = builder.add_leaves({}, origins);
+    const std::vector<volume::LeafRef> refs = builder.add_leaves({}, origins);
     for (std::size_t n = 0; n < 4096; ++n) {
-      std::fill_n(refs[n].values, leaf_voxels, 0.5F);
+      std::fill_n(refs[n].values, volume::leaf_voxels, 0.5F);
       std::fill_n(refs[n].active, 8, ~std::uint64_t{0});
     }
     for (std::size_t n = 4096; n < refs.size(); ++n)
       EXPECT_EQ(refs[n].values[511], background);
-    refs[4096].values[100] = 9;         // one value
-    refs[4097].active[3] = 1;           // one active voxel, so it stays too
-    const Grid grid = builder.finish(); // the third of them is background
+    refs[4096].values[100] = 9;                 // one value
+    refs[4097].active[3] = 1;                   // one active voxel, so it stays too
+    const volume::Grid grid = builder.finish(); // the third of them is background
     EXPECT_EQ(grid.leaves().size(), 2U);
     ASSERT_EQ(grid.tiles().size(), 1U);
     EXPECT_EQ(grid.tiles()[0].dim, 128);
@@ -173,19 +173,19 @@ TEST(Grid, PruneMakesTilesOfConstantLeavesAndOfBlocksOfThem) {
 
 TEST(Grid, SharedLeafOutlivesItsLender) {
   const Int3 origin{0, 0, 0};
-  GridBuilder builder(GridInfo{});
+  volume::GridBuilder builder(volume::GridInfo{});
   const float* place = nullptr;
   {
-    GridBuilder lender(GridInfo{});
-    const LeafRef leaf = lender.add_leaves({}, {&origin, 1}).at(0);
-    std::fill_n(leaf.values, leaf_voxels, 0.75F);
-    const Grid lent = lender.finish(false);
+    volume::GridBuilder lender(volume::GridInfo{});
+    const volume::LeafRef leaf = lender.add_leaves({}, {&origin, 1}).at(0);
+    std::fill_n(leaf.values, volume::leaf_voxels, 0.75F);
+    const volume::Grid lent = lender.finish(false);
     place = lent.leaves().at(0).values;
     builder.share_leaf(lent, lent.leaves().at(0));
   }
-  const Grid grid = builder.finish(false);
+  const volume::Grid grid = builder.finish(false);
   EXPECT_EQ(grid.leaves().at(0).values, place); // not copied
-  EXPECT_EQ(GridAccessor(grid).value({3, 4, 5}), 0.75F);
+  EXPECT_EQ(volume::GridAccessor(grid).value({3, 4, 5}), 0.75F);
 }
 
 /// Every figure against a plain loop over all voxels, for isovalues between and on single precision
@@ -195,11 +195,11 @@ TEST(VolumeStats, AgreesWithPlainSums) {
   std::uniform_real_distribution<float> value(-1, 2);
   for (const bool level_set : {false, true})
     for (const double isovalue : {0.5, 0.1, -0.3, 1.0 / 3}) {
-      GridInfo info;
+      volume::GridInfo info;
       info.isovalue = isovalue;
       info.level_set = level_set;
-      info.transform = uniform_transform(0.5);
-      GridBuilder builder(info);
+      info.transform = volume::uniform_transform(0.5);
+      volume::GridBuilder builder(info);
       const std::vector<Int3> origins{{0, 0, 0}, {8, 0, -8}, {64, 0, 0}};
       double sum = 0;
       float min = 0.3F, max = 0.3F;
@@ -211,14 +211,14 @@ TEST(VolumeStats, AgreesWithPlainSums) {
         min = test::smaller(min, v);
         max = test::larger(max, v);
       };
-      for (const LeafRef& leaf : builder.add_leaves({}, origins))
-        for (int n = 0; n < leaf_voxels; ++n) {
+      for (const volume::LeafRef& leaf : builder.add_leaves({}, origins))
+        for (int n = 0; n < volume::leaf_voxels; ++n) {
           leaf.values[n] = n % 5 == 0 ? static_cast<float>(isovalue) : value(random);
           count(leaf.values[n], 1);
         }
       builder.add_tile({{128, 0, 0}, 128, 0.3F, true});
       count(0.3F, std::uint64_t{128} * 128 * 128);
-      const VolumeStats stats = volume_stats({}, builder.finish(false));
+      const volume::VolumeStats stats = volume::volume_stats({}, builder.finish(false));
       EXPECT_EQ(stats.inside_voxels, inside);
       EXPECT_NEAR(stats.volume, sum / 8, 1e-12 * std::fabs(sum));
       EXPECT_EQ(stats.min, static_cast<double>(min));
@@ -227,33 +227,35 @@ TEST(VolumeStats, AgreesWithPlainSums) {
 }
 
 TEST(Grid, SummaryTellsWhatValuesHaveInCommon) {
-  const auto summary = [](const std::function<void(const LeafRef&)>& change,
-                          const TileView& tile = {{8, 0, 0}, 8, 0.5F, true}) {
-    GridBuilder builder(GridInfo{});
+  const auto summary = [](const std::function<void(const volume::LeafRef&)>& change,
+                          const volume::TileView& tile = {{8, 0, 0}, 8, 0.5F, true}) {
+    volume::GridBuilder builder(volume::GridInfo{});
     const Int3 origin{0, 0, 0};
-    const LeafRef leaf = builder.add_leaves({}, {&origin, 1}).at(0);
-    for (int n = 0; n < leaf_voxels; ++n)
+    const volume::LeafRef leaf = builder.add_leaves({}, {&origin, 1}).at(0);
+    for (int n = 0; n < volume::leaf_voxels; ++n)
       leaf.values[n] = static_cast<float>(n + 1) / 1024;
     std::fill_n(leaf.active, 8, ~std::uint64_t{0});
     change(leaf);
     builder.add_tile(tile);
     return builder.finish(false).summary({});
   };
-  const ValueSummary plain = summary([](const LeafRef&) {});
+  const volume::ValueSummary plain = summary([](const volume::LeafRef&) {});
   EXPECT_TRUE(plain.finite && plain.active_where_not_0 && plain.varied_leaves);
   EXPECT_EQ(plain.min, 1.0F / 1024);
   EXPECT_EQ(plain.max, 0.5F);
-  EXPECT_EQ(summary([](const LeafRef& l) { l.values[77] = -3; }).min, -3);
-  EXPECT_EQ(summary([](const LeafRef& l) { l.values[77] = 3; }).max, 3);
-  EXPECT_TRUE(std::signbit(summary([](const LeafRef& l) { l.values[77] = -0.0F; }).min));
-  EXPECT_FALSE(summary([](const LeafRef& l) { l.values[77] = NAN; }).finite);
-  EXPECT_FALSE(summary([](const LeafRef& l) { l.values[77] = -NAN; }).finite);
-  EXPECT_FALSE(summary([](const LeafRef& l) { l.values[77] = -HUGE_VALF; }).finite);
-  EXPECT_FALSE(summary([](const LeafRef&) {}, {{8, 0, 0}, 8, NAN, true}).finite);
-  EXPECT_FALSE(summary([](const LeafRef& l) { l.values[77] = 0; }).active_where_not_0);
-  EXPECT_FALSE(summary([](const LeafRef& l) { l.active[3] = 1; }).active_where_not_0);
-  EXPECT_FALSE(summary([](const LeafRef&) {}, {{8, 0, 0}, 8, 0.5F, false}).active_where_not_0);
-  EXPECT_FALSE(summary([](const LeafRef&) {}, {{8, 0, 0}, 8, 0, true}).active_where_not_0);
+  EXPECT_EQ(summary([](const volume::LeafRef& l) { l.values[77] = -3; }).min, -3);
+  EXPECT_EQ(summary([](const volume::LeafRef& l) { l.values[77] = 3; }).max, 3);
+  EXPECT_TRUE(std::signbit(summary([](const volume::LeafRef& l) { l.values[77] = -0.0F; }).min));
+  EXPECT_FALSE(summary([](const volume::LeafRef& l) { l.values[77] = NAN; }).finite);
+  EXPECT_FALSE(summary([](const volume::LeafRef& l) { l.values[77] = -NAN; }).finite);
+  EXPECT_FALSE(summary([](const volume::LeafRef& l) { l.values[77] = -HUGE_VALF; }).finite);
+  EXPECT_FALSE(summary([](const volume::LeafRef&) {}, {{8, 0, 0}, 8, NAN, true}).finite);
+  EXPECT_FALSE(summary([](const volume::LeafRef& l) { l.values[77] = 0; }).active_where_not_0);
+  EXPECT_FALSE(summary([](const volume::LeafRef& l) { l.active[3] = 1; }).active_where_not_0);
   EXPECT_FALSE(
-      summary([](const LeafRef& l) { std::fill_n(l.values, leaf_voxels, 0.25F); }).varied_leaves);
+      summary([](const volume::LeafRef&) {}, {{8, 0, 0}, 8, 0.5F, false}).active_where_not_0);
+  EXPECT_FALSE(summary([](const volume::LeafRef&) {}, {{8, 0, 0}, 8, 0, true}).active_where_not_0);
+  EXPECT_FALSE(summary([](const volume::LeafRef& l) {
+                 std::fill_n(l.values, volume::leaf_voxels, 0.25F);
+               }).varied_leaves);
 }

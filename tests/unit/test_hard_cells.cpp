@@ -14,7 +14,7 @@
 #include <fstream>
 #include <string>
 
-namespace gewebe {
+namespace gewebe::test {
 namespace {
 
 using namespace scenes;
@@ -22,8 +22,8 @@ using namespace scenes;
 using Cell = std::array<double, 8>; // values at x + 2 y + 4 z, isovalue 0
 
 /// The cell across the border of leaves, all else well outside.
-Grid padded(const Cell& cell) {
-  GridInfo info;
+volume::Grid padded(const Cell& cell) {
+  volume::GridInfo info;
   double largest = 0;
   for (const double value : cell)
     largest = test::larger(largest, std::abs(value));
@@ -39,30 +39,32 @@ struct Topology {
   bool operator==(const Topology&) const = default;
 };
 
-Topology topology(const MeshReport& report) {
+Topology topology(const mesh::MeshReport& report) {
   EXPECT_TRUE(is_sound(report));
   return {static_cast<std::int64_t>(report.components), report.euler};
 }
 
 /// Of the trilinear interpolant of a padded cell: its mesh on a lattice `fine` times finer.
-Topology trilinear_topology(const Grid& grid, int fine) {
-  Field field(grid);
-  GridInfo info = grid.info();
-  const Grid samples =
+Topology trilinear_topology(const volume::Grid& grid, int fine) {
+  volume::Field field(grid);
+  volume::GridInfo info = grid.info();
+  const volume::Grid samples =
       sample(info, {6 * fine, 6 * fine, 6 * fine}, {9 * fine, 9 * fine, 9 * fine},
              [&](int i, int j, int k) {
                return field.value({1.0 * i / fine, 1.0 * j / fine, 1.0 * k / fine});
              });
-  return topology(examine_mesh(marching_cubes({}, samples).mesh));
+  return topology(mesh::examine_mesh(surface::marching_cubes({}, samples).mesh));
 }
 
 /// At every epsilon sound, and of one topology: the fixed rule's.
-Topology fixed_topology(const Grid& grid, const std::string& name) {
-  const IsoSurface surface = marching_cubes({}, grid);
-  const Topology plain = topology(examine_mesh(surface.mesh));
+Topology fixed_topology(const volume::Grid& grid, const std::string& name) {
+  const surface::IsoSurface surface = surface::marching_cubes({}, grid);
+  const Topology plain = topology(mesh::examine_mesh(surface.mesh));
   for (const double epsilon : {0.0, 0.05, 0.15, 0.25, 0.35, 0.45, 0.5})
-    for (const auto place : {SnapOptions::Place::mean, SnapOptions::Place::corner})
-      EXPECT_EQ(topology(examine_mesh(snap({}, surface, {epsilon, place}).mesh)), plain)
+    for (const auto place :
+         {surface::SnapOptions::Place::mean, surface::SnapOptions::Place::corner})
+      EXPECT_EQ(topology(mesh::examine_mesh(surface::snap({}, surface, {epsilon, place}).mesh)),
+                plain)
           << name << ", epsilon " << epsilon;
   return plain;
 }
@@ -121,7 +123,7 @@ const std::vector<HardCell> hard_cells{
 
 TEST(HardCells, OfOurOwn) {
   for (const HardCell& hard : hard_cells) {
-    const Grid grid = padded(hard.cell);
+    const volume::Grid grid = padded(hard.cell);
     EXPECT_EQ(fixed_topology(grid, hard.name), hard.fixed) << hard.name;
     for (const int fine : {12, 17}) {
       EXPECT_EQ(trilinear_topology(grid, fine), hard.trilinear) << hard.name << ", " << fine;
@@ -141,7 +143,7 @@ TEST(HardCells, OfMcPro) {
   for (const auto& [name, entry] : cells.items()) {
     ASSERT_EQ(entry.at("values").size(), 8U);
     const Cell cell = entry.at("values").get<Cell>();
-    const Grid grid = padded(cell);
+    const volume::Grid grid = padded(cell);
     const Topology fixed = fixed_topology(grid, name);
     const Topology coarse = trilinear_topology(grid, 12), fine = trilinear_topology(grid, 17);
     if (fixed != fine || coarse != fine) {
@@ -174,4 +176,4 @@ TEST(HardCells, OfMcPro) {
 }
 
 } // namespace
-} // namespace gewebe
+} // namespace gewebe::test

@@ -24,7 +24,7 @@
 #include <random>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::test {
 namespace {
 
 using Eigen::Matrix3d;
@@ -35,10 +35,10 @@ using Eigen::VectorXd;
 constexpr double young = 2500;
 constexpr std::array<Vec3, 4> corners{
     {{0.3, -0.2, 0.1}, {2.1, 0.4, -0.3}, {0.2, 1.7, 0.5}, {0.6, 0.3, 1.4}}};
-constexpr std::array<HyperelasticLaw, 2> laws{test::stable_neo_hookean, test::neo_hookean};
+constexpr std::array<model::HyperelasticLaw, 2> laws{test::stable_neo_hookean, test::neo_hookean};
 
-std::vector<HyperelasticLaw> all_laws() {
-  std::vector<HyperelasticLaw> all(laws.begin(), laws.end());
+std::vector<model::HyperelasticLaw> all_laws() {
+  std::vector<model::HyperelasticLaw> all(laws.begin(), laws.end());
   all.insert(all.end(), test::modified_laws.begin(), test::modified_laws.end());
   return all;
 }
@@ -52,19 +52,20 @@ Vector3d eigen(const Vec3& v) {
 
 /// An element under displacements of its nodes, the last one the bubble's.
 struct Moved {
-  SolidElement element;
+  fem::SolidElement element;
   bool quadratic = false;
   std::vector<Vec3> u;
 
   std::size_t unknowns() const { return quadratic ? 33 : 12; }
-  HyperelasticResponse response(const HyperelasticLaw& law, HyperelasticPart part) const {
-    HyperelasticResponse r;
-    SolidElement own = element;
+  fem::HyperelasticResponse response(const model::HyperelasticLaw& law,
+                                     fem::HyperelasticPart part) const {
+    fem::HyperelasticResponse r;
+    fem::SolidElement own = element;
     own.law = law;
-    hyperelastic_response(own, std::span(u).first(quadratic ? 10 : 4), u.back(), part, r);
+    fem::hyperelastic_response(own, std::span(u).first(quadratic ? 10 : 4), u.back(), part, r);
     return r;
   }
-  MatrixXd tangent(const HyperelasticLaw& law, HyperelasticPart part) const {
+  MatrixXd tangent(const model::HyperelasticLaw& law, fem::HyperelasticPart part) const {
     const auto r = response(law, part);
     const auto n = static_cast<Eigen::Index>(unknowns());
     MatrixXd k(n, n);
@@ -79,7 +80,7 @@ struct Moved {
 std::vector<Vec3> places(bool quadratic) {
   std::vector<Vec3> p(corners.begin(), corners.end());
   if (quadratic) {
-    for (const auto& [i, j] : tetrahedron_edges)
+    for (const auto& [i, j] : tetrahedra::tetrahedron_edges)
       p.push_back((corners[i] + corners[j]) / 2);
     p.push_back({});
   }
@@ -90,7 +91,8 @@ std::vector<Vec3> places(bool quadratic) {
 Moved moved(bool quadratic, double poisson, double by, bool mirrored = false) {
   std::mt19937 random(7);
   std::uniform_real_distribution<double> any(-1, 1);
-  Moved m{solid_element(corners, elasticity(young, poisson)), quadratic, places(quadratic)};
+  Moved m{fem::solid_element(corners, fem::elasticity(young, poisson)), quadratic,
+          places(quadratic)};
   const Matrix3d turn = Eigen::AngleAxisd(1.3, Vector3d(1, 2, -1).normalized()).toRotationMatrix();
   for (std::size_t a = 0; a < m.u.size(); ++a) {
     Vector3d to = turn * eigen(m.u[a]);
@@ -105,7 +107,8 @@ Moved moved(bool quadratic, double poisson, double by, bool mirrored = false) {
 }
 
 /// The same by the formula, in its order.
-double entry_of(const TangentPoint& q, std::size_t m, std::size_t n, std::size_t i, std::size_t j) {
+double entry_of(const fem::TangentPoint& q, std::size_t m, std::size_t n, std::size_t i,
+                std::size_t j) {
   const auto gradient = [&](std::size_t k) {
     return Vec3{q.gradient[0][k], q.gradient[1][k], q.gradient[2][k]};
   };
@@ -127,12 +130,12 @@ double entry_of(const TangentPoint& q, std::size_t m, std::size_t n, std::size_t
 TEST(HyperelasticKernel, GivesTheSameBitsAtEveryLevelOfCpu) {
   std::mt19937 random(5);
   std::uniform_real_distribution<double> any(-1, 1);
-  std::vector<AddTangent> kernels{&add_tangent_baseline};
+  std::vector<fem::AddTangent> kernels{&fem::add_tangent_baseline};
   if (best_cpu_level() != CpuLevel::baseline)
-    kernels.push_back(&add_tangent_avx2);
+    kernels.push_back(&fem::add_tangent_avx2);
   for (const std::size_t count : {4U, 11U}) {
-    std::vector<TangentPoint> points(3);
-    for (TangentPoint& q : points) {
+    std::vector<fem::TangentPoint> points(3);
+    for (fem::TangentPoint& q : points) {
       for (double* const value : {&q.weight, &q.a, &q.b, &q.c, &q.d})
         *value = any(random);
       for (std::size_t k = 0; k < 9; ++k) {
@@ -143,15 +146,15 @@ TEST(HyperelasticKernel, GivesTheSameBitsAtEveryLevelOfCpu) {
         for (std::size_t n = 0; n < count; ++n)
           axis[n] = any(random);
     }
-    for (const AddTangent kernel : kernels) {
-      TangentSums sums{};
-      for (const TangentPoint& q : points)
+    for (const fem::AddTangent kernel : kernels) {
+      fem::TangentSums sums{};
+      for (const fem::TangentPoint& q : points)
         kernel(q, count, sums);
       for (std::size_t k = 0; k < 9; ++k)
         for (std::size_t m = 0; m < count; ++m)
           for (std::size_t n = m; n < count; ++n) {
             double sum = 0;
-            for (const TangentPoint& q : points)
+            for (const fem::TangentPoint& q : points)
               sum += entry_of(q, m, n, k / 3, k % 3);
             EXPECT_EQ(sums[k][m][n], sum);
           }
@@ -161,12 +164,13 @@ TEST(HyperelasticKernel, GivesTheSameBitsAtEveryLevelOfCpu) {
 
 TEST(Hyperelastic, AtRestItIsTheElementOfSmallStrains) {
   for (const double poisson : {0.0, 0.3, 0.499})
-    for (const HyperelasticLaw& law : all_laws())
+    for (const model::HyperelasticLaw& law : all_laws())
       for (const bool quadratic : {false, true})
-        for (const auto part : {HyperelasticPart::tangent, HyperelasticPart::positive_tangent}) {
-          Moved m{solid_element(corners, elasticity(young, poisson)), quadratic, {}};
+        for (const auto part :
+             {fem::HyperelasticPart::tangent, fem::HyperelasticPart::positive_tangent}) {
+          Moved m{fem::solid_element(corners, fem::elasticity(young, poisson)), quadratic, {}};
           m.u.resize(quadratic ? 11 : 4);
-          const HyperelasticResponse r = m.response(law, part);
+          const fem::HyperelasticResponse r = m.response(law, part);
           EXPECT_NEAR(r.energy, 0, 1e-14 * young * m.element.volume);
           MatrixXd k = m.tangent(law, part);
           for (const Vec3& f : r.force)
@@ -179,15 +183,15 @@ TEST(Hyperelastic, AtRestItIsTheElementOfSmallStrains) {
           double worst = 0;
           for (std::size_t a = 0; a < (quadratic ? 10U : 4U); ++a)
             for (std::size_t b = 0; b < (quadratic ? 10U : 4U); ++b) {
-              const SolidBlock block =
-                  quadratic ? quadratic_block(m.element, a, b) : linear_block(m.element, a, b);
+              const fem::SolidBlock block = quadratic ? fem::quadratic_block(m.element, a, b)
+                                                      : fem::linear_block(m.element, a, b);
               for (std::size_t i = 0; i < 9; ++i)
                 worst = test::larger(
                     worst, std::abs(block[i] - k(static_cast<Eigen::Index>(3 * a + i / 3),
                                                  static_cast<Eigen::Index>(3 * b + i % 3))));
             }
           // The positive one raises the rotations' eigenvalues from 0 to mu / 1000.
-          if (part == HyperelasticPart::tangent)
+          if (part == fem::HyperelasticPart::tangent)
             EXPECT_LE(worst, 1e-13 * k.norm()) << poisson << ' ' << quadratic;
           else
             EXPECT_LE(worst, 1e-3 * k.norm()) << poisson << ' ' << quadratic;
@@ -197,13 +201,13 @@ TEST(Hyperelastic, AtRestItIsTheElementOfSmallStrains) {
 TEST(Hyperelastic, ForcesAndTangentsAreDerivatives) {
   for (const bool mirrored : {false, true})
     for (const double poisson : {0.0, 0.3, 0.499})
-      for (const HyperelasticLaw& law : all_laws())
+      for (const model::HyperelasticLaw& law : all_laws())
         for (const bool quadratic : {false, true}) {
-          if (mirrored && law.kind == HyperelasticLaw::neo_hookean)
+          if (mirrored && law.kind == model::HyperelasticLaw::neo_hookean)
             continue;
           Moved m = moved(quadratic, poisson, mirrored ? 0.2 : 0.05, mirrored);
-          const auto r = m.response(law, HyperelasticPart::force);
-          const MatrixXd k = m.tangent(law, HyperelasticPart::tangent);
+          const auto r = m.response(law, fem::HyperelasticPart::force);
+          const MatrixXd k = m.tangent(law, fem::HyperelasticPart::tangent);
           EXPECT_LE((k - k.transpose()).norm(), 1e-14 * k.norm());
           VectorXd slope(k.rows()), force(k.rows());
           MatrixXd change(k.rows(), k.rows());
@@ -219,7 +223,7 @@ TEST(Hyperelastic, ForcesAndTangentsAreDerivatives) {
             for (const auto& [step, weight] : std::array<std::array<double, 2>, 4>{
                      {{-2, 1.0 / 12}, {-1, -8.0 / 12}, {1, 8.0 / 12}, {2, -1.0 / 12}}}) {
               m.u[a][axis] = at + step * h;
-              const auto there = m.response(law, HyperelasticPart::force);
+              const auto there = m.response(law, fem::HyperelasticPart::force);
               slope[n] += weight / h * there.energy;
               for (Eigen::Index row = 0; row < k.rows(); ++row)
                 change(row, n) +=
@@ -237,7 +241,7 @@ TEST(Hyperelastic, ForcesAndTangentsAreDerivatives) {
 TEST(Hyperelastic, ATurnedFrameTurnsForcesAlone) {
   const Matrix3d turn =
       Eigen::AngleAxisd(2.1, Vector3d(-1, 0.5, 2).normalized()).toRotationMatrix();
-  for (const HyperelasticLaw& law : all_laws())
+  for (const model::HyperelasticLaw& law : all_laws())
     for (const bool quadratic : {false, true}) {
       const Moved m = moved(quadratic, 0.49, 0.05);
       Moved other = m;
@@ -246,8 +250,8 @@ TEST(Hyperelastic, ATurnedFrameTurnsForcesAlone) {
         other.u[a] =
             vec(turn * eigen(at[a] + m.u[a]) + (a < 10 ? Vector3d(3, 1, -2) : Vector3d(0, 0, 0))) -
             at[a];
-      const auto r = m.response(law, HyperelasticPart::force),
-                 s = other.response(law, HyperelasticPart::force);
+      const auto r = m.response(law, fem::HyperelasticPart::force),
+                 s = other.response(law, fem::HyperelasticPart::force);
       EXPECT_GT(r.energy, 1);
       EXPECT_NEAR(r.energy, s.energy, 1e-12 * r.energy);
       double size = 0, worst = 0;
@@ -260,7 +264,7 @@ TEST(Hyperelastic, ATurnedFrameTurnsForcesAlone) {
       Moved turned = m;
       for (std::size_t a = 0; a < turned.u.size(); ++a)
         turned.u[a] = vec(turn * eigen(at[a])) - at[a];
-      const auto none = turned.response(law, HyperelasticPart::force);
+      const auto none = turned.response(law, fem::HyperelasticPart::force);
       EXPECT_NEAR(none.energy, 0, 1e-12 * young);
       for (const Vec3& f : none.force)
         EXPECT_LE(norm(f), 1e-11 * young);
@@ -268,18 +272,18 @@ TEST(Hyperelastic, ATurnedFrameTurnsForcesAlone) {
 }
 
 TEST(Hyperelastic, PositiveTangentsArePositive) {
-  for (const HyperelasticLaw& law : all_laws())
+  for (const model::HyperelasticLaw& law : all_laws())
     for (const bool mirrored : {false, true})
       for (const bool quadratic : {false, true}) {
-        if (law.kind == HyperelasticLaw::neo_hookean)
+        if (law.kind == model::HyperelasticLaw::neo_hookean)
           continue; // inverted here
         const Moved m = moved(quadratic, 0.4, 0.4, mirrored);
-        const auto least = [&](HyperelasticPart part) {
+        const auto least = [&](fem::HyperelasticPart part) {
           const Eigen::SelfAdjointEigenSolver<MatrixXd> solver(m.tangent(law, part));
           return solver.eigenvalues()[0] / solver.eigenvalues().maxCoeff();
         };
-        EXPECT_LT(least(HyperelasticPart::tangent), -1e-5);
-        EXPECT_GT(least(HyperelasticPart::positive_tangent), -1e-13);
+        EXPECT_LT(least(fem::HyperelasticPart::tangent), -1e-5);
+        EXPECT_GT(least(fem::HyperelasticPart::positive_tangent), -1e-13);
       }
 }
 
@@ -293,9 +297,9 @@ TEST(Hyperelastic, AnInvertedElementHasAnEnergyUnlessClassical) {
       return m;
     }();
     for (const Moved& m : {flat, moved(quadratic, 0.45, 0, true)}) {
-      for (const HyperelasticLaw& law : all_laws()) {
-        const auto r = m.response(law, HyperelasticPart::force);
-        if (law.kind == HyperelasticLaw::neo_hookean) {
+      for (const model::HyperelasticLaw& law : all_laws()) {
+        const auto r = m.response(law, fem::HyperelasticPart::force);
+        if (law.kind == model::HyperelasticLaw::neo_hookean) {
           EXPECT_EQ(r.energy, HUGE_VAL);
           continue;
         }
@@ -309,17 +313,17 @@ TEST(Hyperelastic, AnInvertedElementHasAnEnergyUnlessClassical) {
 
 /// A body that is held.
 struct Body {
-  TetMesh mesh;
-  std::vector<SolidMaterial> materials;
-  std::vector<SolidElement> elements;
+  tetrahedra::TetMesh mesh;
+  std::vector<fem::SolidMaterial> materials;
+  std::vector<fem::SolidElement> elements;
   std::vector<std::uint8_t> fixed;
   std::vector<double> prescribed;
 
-  Body(TetMesh of_corners, bool quadratic, const SolidMaterial& material)
+  Body(tetrahedra::TetMesh of_corners, bool quadratic, const fem::SolidMaterial& material)
       : mesh(std::move(of_corners)), materials{material} {
     if (quadratic)
-      make_quadratic(mesh);
-    elements = solid_elements(mesh, materials);
+      tetrahedra::make_quadratic(mesh);
+    elements = fem::solid_elements(mesh, materials);
     fixed.resize(3 * mesh.points.size());
     prescribed.resize(fixed.size());
   }
@@ -331,7 +335,7 @@ struct Body {
       }
   }
   std::vector<double> end_load(double x, const Vec3& traction) const {
-    const TetBoundary faces = boundary(mesh);
+    const tetrahedra::TetBoundary faces = tetrahedra::boundary(mesh);
     std::vector<std::uint32_t> found;
     for (std::uint32_t k = 0; k < faces.mesh.triangles.size(); ++k) {
       bool there = true;
@@ -340,12 +344,13 @@ struct Body {
       if (there)
         found.push_back(k);
     }
-    return traction_load(mesh, faces, found, traction);
+    return fem::traction_load(mesh, faces, found, traction);
   }
-  HyperelasticState solve(const SolidVector& load, HyperelasticOptions options = {}) const {
-    return hyperelastic_statics(mesh, elements, fixed, prescribed, load, options);
+  fit::HyperelasticState solve(const fit::SolidVector& load,
+                               fit::HyperelasticOptions options = {}) const {
+    return fit::hyperelastic_statics(mesh, elements, fixed, prescribed, load, options);
   }
-  Vec3 displacement(const SolidVector& u, const Vec3& p) const {
+  Vec3 displacement(const fit::SolidVector& u, const Vec3& p) const {
     for (std::size_t i = 0; i < mesh.points.size(); ++i)
       if (norm(mesh.points[i] - p) < 1e-9 * (1 + norm(p)))
         return {u.axes[3 * i], u.axes[3 * i + 1], u.axes[3 * i + 2]};
@@ -355,7 +360,7 @@ struct Body {
 };
 
 TEST(HyperelasticStatics, UniaxialStretchIsAnalytic) {
-  for (const HyperelasticLaw& law : laws)
+  for (const model::HyperelasticLaw& law : laws)
     for (const bool quadratic : {false, true})
       for (const double poisson : {0.3, 0.499})
         for (const double stretch : {0.6, 1.7}) {
@@ -364,10 +369,10 @@ TEST(HyperelasticStatics, UniaxialStretchIsAnalytic) {
             box.hold(axis, [&](const Vec3& p) { return p[axis] == 0; });
           box.hold(
               0, [](const Vec3& p) { return p.x == 2; }, 2 * (stretch - 1));
-          const SolidVector no_load{std::vector<double>(box.fixed.size()), {}};
+          const fit::SolidVector no_load{std::vector<double>(box.fixed.size()), {}};
           const auto state = box.solve(no_load);
           // The stretch across for which nothing pulls there.
-          const Elasticity m = elasticity(young, poisson);
+          const fem::Elasticity m = fem::elasticity(young, poisson);
           const auto across = [&](double s) {
             return test::first_piola(law, m, Vector3d(stretch, s, s).asDiagonal())(1, 1);
           };
@@ -377,7 +382,7 @@ TEST(HyperelasticStatics, UniaxialStretchIsAnalytic) {
           const Vec3 u = box.displacement(state.displacement, {2, 1, 1});
           EXPECT_NEAR(u.y, low - 1, 1e-9);
           EXPECT_NEAR(u.z, low - 1, 1e-9);
-          const auto f = hyperelastic_forces(box.mesh, box.elements, state.displacement);
+          const auto f = fit::hyperelastic_forces(box.mesh, box.elements, state.displacement);
           double pull = 0;
           for (std::size_t i = 0; i < box.mesh.points.size(); ++i)
             pull -= box.mesh.points[i].x == 2 ? f.axes[3 * i] : 0;
@@ -394,11 +399,12 @@ TEST(HyperelasticStatics, SmallLoadsGiveSmallStrains) {
     for (int axis = 0; axis < 3; ++axis)
       beam.hold(axis, [](const Vec3& p) { return p.x == 0; });
     const Vec3 g{0, 1e-6, -3e-6};
-    const auto state = beam.solve(hyperelastic_weight(beam.mesh, beam.materials, beam.elements, g));
-    const auto load = gravity_load(beam.mesh, beam.materials, beam.elements, g);
-    const StiffnessMatrix k = solid_stiffness(beam.mesh, beam.elements, beam.fixed);
+    const auto state =
+        beam.solve(fit::hyperelastic_weight(beam.mesh, beam.materials, beam.elements, g));
+    const auto load = fem::gravity_load(beam.mesh, beam.materials, beam.elements, g);
+    const linalg::StiffnessMatrix k = fem::solid_stiffness(beam.mesh, beam.elements, beam.fixed);
     std::vector<double> u(load.size());
-    solve_axes(k, Factor(k, {}), load, u);
+    linalg::solve_axes(k, linalg::Factor(k, {}), load, u);
     double worst = 0, most = 0;
     for (std::size_t axis = 0; axis < u.size(); ++axis) {
       worst = test::larger(worst, std::abs(u[axis] - state.displacement.axes[axis]));
@@ -414,7 +420,7 @@ TEST(HyperelasticStatics, SmallLoadsGiveSmallStrains) {
 /// back.
 TEST(HyperelasticStatics, ASlenderBeamIsAnElastica) {
   const double length = 200, height = 5, e = 1e5;
-  for (const HyperelasticLaw& law : laws) {
+  for (const model::HyperelasticLaw& law : laws) {
     Body beam(test::box_tetrahedra(40, 1, 1, height), true, {e, 0, 1, law});
     for (int axis = 0; axis < 3; ++axis)
       beam.hold(axis, [](const Vec3& p) { return p.x == 0; });
@@ -430,8 +436,8 @@ TEST(HyperelasticStatics, ASlenderBeamIsAnElastica) {
 
 /// A motion without change of volume: two shears, one behind the other.
 struct MadeUp {
-  Elasticity material;
-  HyperelasticLaw law;
+  fem::Elasticity material;
+  model::HyperelasticLaw law;
 
   static Vector3d place(const Vector3d& p) {
     const double x = p.x() + 0.25 * std::sin(2.5 * p.y() + 0.3);
@@ -484,15 +490,16 @@ std::vector<double> shapes(const std::array<double, 4>& l, bool quadratic) {
     return n;
   for (std::size_t a = 0; a < 4; ++a)
     n[a] = l[a] * (2 * l[a] - 1);
-  for (const auto& [i, j] : tetrahedron_edges)
+  for (const auto& [i, j] : tetrahedra::tetrahedron_edges)
     n.push_back(4 * l[i] * l[j]);
   n.push_back(256 * l[0] * l[1] * l[2] * l[3]);
   return n;
 }
 
-double made_up_error(std::uint32_t n, bool quadratic, double poisson, const HyperelasticLaw& law) {
+double made_up_error(std::uint32_t n, bool quadratic, double poisson,
+                     const model::HyperelasticLaw& law) {
   Body body(test::box_tetrahedra(n, n, n, 1.0 / n), quadratic, {young, poisson, 1, law});
-  const MadeUp motion{elasticity(young, poisson), law};
+  const MadeUp motion{fem::elasticity(young, poisson), law};
   const auto side = [](double x) { return x < 1e-9 || x > 1 - 1e-9; };
   for (std::size_t i = 0; i < body.mesh.points.size(); ++i) {
     const Vec3& p = body.mesh.points[i];
@@ -507,7 +514,7 @@ double made_up_error(std::uint32_t n, bool quadratic, double poisson, const Hype
     return std::size_t{a < 4 ? body.mesh.tetrahedra[t][a] : body.mesh.middles[t][a - 4]};
   };
   const std::size_t count = quadratic ? 10 : 4;
-  SolidVector load{std::vector<double>(body.fixed.size()), {}};
+  fit::SolidVector load{std::vector<double>(body.fixed.size()), {}};
   load.bubbles.resize(quadratic ? body.elements.size() : 0);
   const auto points = integration_points();
   const auto place = [&](std::size_t t, const std::array<double, 4>& l) {
@@ -544,7 +551,7 @@ double made_up_error(std::uint32_t n, bool quadratic, double poisson, const Hype
 }
 
 TEST(HyperelasticStatics, LargeDisplacementsConvergeWithOrders2And3) {
-  for (const HyperelasticLaw& law : laws)
+  for (const model::HyperelasticLaw& law : laws)
     for (const double poisson : {0.3, 0.499}) {
       const double order =
           std::log2(made_up_error(3, true, poisson, law) / made_up_error(6, true, poisson, law));
@@ -581,11 +588,11 @@ TEST(HyperelasticStatics, AnyNumberOfThreadsGivesTheSameBytes) {
   Body beam(test::box_tetrahedra(8, 3, 3), true, {young, 0.45, 1});
   for (int axis = 0; axis < 3; ++axis)
     beam.hold(axis, [](const Vec3& p) { return p.x == 0; });
-  const auto load = hyperelastic_weight(beam.mesh, beam.materials, beam.elements, {0, 2, -5});
+  const auto load = fit::hyperelastic_weight(beam.mesh, beam.materials, beam.elements, {0, 2, -5});
   const auto with = [&](int threads) {
     Context context;
     context.threads = threads;
-    return hyperelastic_statics(beam.mesh, beam.elements, beam.fixed, {}, load, {}, context)
+    return fit::hyperelastic_statics(beam.mesh, beam.elements, beam.fixed, {}, load, {}, context)
         .displacement.axes;
   };
   EXPECT_TRUE(test::same_bytes(with(1), with(4)));
@@ -594,8 +601,9 @@ TEST(HyperelasticStatics, AnyNumberOfThreadsGivesTheSameBytes) {
 TEST(HyperelasticStatics, ABodyThatNothingHoldsIsRefused) {
   Body free(test::box_tetrahedra(1, 1, 1), true, {young, 0.3, 1});
   EXPECT_THROW(
-      free.solve(hyperelastic_weight(free.mesh, free.materials, free.elements, {0, 0, -5})), Error);
+      free.solve(fit::hyperelastic_weight(free.mesh, free.materials, free.elements, {0, 0, -5})),
+      Error);
 }
 
 } // namespace
-} // namespace gewebe
+} // namespace gewebe::test

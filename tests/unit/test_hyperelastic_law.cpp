@@ -12,18 +12,18 @@
 #include <utility>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::test {
 namespace {
 
 TEST(HyperelasticLaw, WordsReadBack) {
   for (const char* word : {"neo-hookean", "classical-neo-hookean", "mooney-rivlin",
                            "mooney-rivlin:c01=0.1", "yeoh:c20=-0.2,c30=0.05", "yeoh:c30=1e-05",
                            "ogden:alpha1=-8.2", "ogden:alpha1=4,alpha2=-3,mu2=0.3"})
-    EXPECT_EQ(law_text(parse_law(word)), word);
-  EXPECT_EQ(law_text(parse_law("yeoh:c30=0.5,c20=1.0")), "yeoh:c20=1,c30=0.5");
-  EXPECT_EQ(parse_law("ogden:alpha1=4,alpha2=-3,mu2=0.3"),
-            (HyperelasticLaw{HyperelasticLaw::ogden, {4, -3, 0.3}}));
-  EXPECT_EQ(parse_law("neo-hookean"), HyperelasticLaw{});
+    EXPECT_EQ(model::law_text(model::parse_law(word)), word);
+  EXPECT_EQ(model::law_text(model::parse_law("yeoh:c30=0.5,c20=1.0")), "yeoh:c20=1,c30=0.5");
+  EXPECT_EQ(model::parse_law("ogden:alpha1=4,alpha2=-3,mu2=0.3"),
+            (model::HyperelasticLaw{model::HyperelasticLaw::ogden, {4, -3, 0.3}}));
+  EXPECT_EQ(model::parse_law("neo-hookean"), model::HyperelasticLaw{});
 }
 
 TEST(HyperelasticLaw, WhatIsWrongIsNamed) {
@@ -49,23 +49,24 @@ TEST(HyperelasticLaw, WhatIsWrongIsNamed) {
             "ogden with only one of alpha2 and mu2, expected both or none"},
            {"ogden:alpha1=2,mu2=3", "ogden with only one of alpha2 and mu2"},
        })
-    EXPECT_EQ(test::complaint([&] { (void)parse_law(word); }).substr(0, message.size()), message);
+    EXPECT_EQ(test::complaint([&] { (void)model::parse_law(word); }).substr(0, message.size()),
+              message);
 }
 
 TEST(HyperelasticLaw, TablesHaveLaws) {
-  const auto table = parse_material_table("soft 1e-3 5000 5 0.2 0.49 yeoh:c20=0.1\n"
-                                          "other 1e-3 5000 5 0.2 0.49\n",
-                                          "t");
-  EXPECT_EQ(table[0].law, (HyperelasticLaw{HyperelasticLaw::yeoh, {0.1}}));
+  const auto table = model::parse_material_table("soft 1e-3 5000 5 0.2 0.49 yeoh:c20=0.1\n"
+                                                 "other 1e-3 5000 5 0.2 0.49\n",
+                                                 "t");
+  EXPECT_EQ(table[0].law, (model::HyperelasticLaw{model::HyperelasticLaw::yeoh, {0.1}}));
   EXPECT_FALSE(table[1].law);
   EXPECT_EQ(test::complaint([] {
-              (void)parse_material_table("soft 1e-3 5000 5 0.2 0.49 ogden\n", "t");
+              (void)model::parse_material_table("soft 1e-3 5000 5 0.2 0.49 ogden\n", "t");
             }).substr(0, 25),
             "t:1: ogden without alpha1");
 }
 
-double until(const HyperelasticLaw& law, const std::string& path) {
-  for (const auto& [name, stretch] : law_instabilities(law))
+double until(const model::HyperelasticLaw& law, const std::string& path) {
+  for (const auto& [name, stretch] : model::law_instabilities(law))
     if (name == path)
       return stretch;
   return 0;
@@ -75,13 +76,13 @@ TEST(HyperelasticLaw, StableLawsAreFoundStable) {
   for (const char* word : {"neo-hookean", "classical-neo-hookean", "mooney-rivlin",
                            "mooney-rivlin:c01=0.5", "yeoh", "yeoh:c20=0.1,c30=2", "ogden:alpha1=9",
                            "ogden:alpha1=-20", "ogden:alpha1=4,alpha2=-3,mu2=0.3"})
-    EXPECT_EQ(instability_text(parse_law(word)), "") << word;
+    EXPECT_EQ(model::instability_text(model::parse_law(word)), "") << word;
 }
 
 TEST(HyperelasticLaw, InstabilitiesBeginWhereTheyAreByHand) {
   // Mooney-Rivlin, C01 = -0.1 mu, planar path s, 1, 1/s: D_22 = 4 (C10 (1 + s^-2) + C01 (1 + s²)),
   // D_11 = 4 (C10 + C01) (s² + s^-2), D_12 = 4 (C10 s^-2 + C01 s²).
-  const HyperelasticLaw rivlin = parse_law("mooney-rivlin:c01=-0.1");
+  const model::HyperelasticLaw rivlin = model::parse_law("mooney-rivlin:c01=-0.1");
   const auto determinant = [](double s) {
     const double c10 = 0.6, c01 = -0.1, q = s * s;
     const double a = (c10 + c01) * (q + 1 / q), b = c10 * (1 + 1 / q) + c01 * (1 + q),
@@ -95,7 +96,7 @@ TEST(HyperelasticLaw, InstabilitiesBeginWhereTheyAreByHand) {
   // Yeoh with C20 < 0, uniaxial: nominal stress times s is 2 (s² - 1/s) W'; its slope by log s,
   // 2 (2 s² + 1/s) W' + 4 (s² - 1/s)² W'', is one direction of D, so the law is unstable from
   // where it is 0 at the latest.
-  const HyperelasticLaw yeoh = parse_law("yeoh:c20=-0.2,c30=0.02");
+  const model::HyperelasticLaw yeoh = model::parse_law("yeoh:c20=-0.2,c30=0.02");
   const auto slope = [](double t) {
     const double x = t * t + 2 / t - 3, w = 0.5 - 0.4 * x + 0.06 * x * x, v = -0.4 + 0.12 * x,
                  d = t * t - 1 / t;
@@ -110,10 +111,10 @@ TEST(HyperelasticLaw, InstabilitiesBeginWhereTheyAreByHand) {
   EXPECT_LE(t, zero + 1e-3);
   EXPECT_GT(t, 0.9 * zero);
   // A negative Ogden term outweighs where its power grows faster.
-  EXPECT_NE(instability_text(parse_law("ogden:alpha1=2,alpha2=8,mu2=-0.2"))
+  EXPECT_NE(model::instability_text(model::parse_law("ogden:alpha1=2,alpha2=8,mu2=-0.2"))
                 .find("uniaxial tension beyond a strain of "),
             std::string::npos);
 }
 
 } // namespace
-} // namespace gewebe
+} // namespace gewebe::test

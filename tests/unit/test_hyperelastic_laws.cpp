@@ -20,7 +20,7 @@
 #include <string>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::test {
 namespace {
 
 using Eigen::Matrix3d;
@@ -30,33 +30,33 @@ constexpr double young = 2500;
 
 /// An element of one or two orders, displaced by a uniform gradient.
 struct Uniform {
-  SolidElement element;
+  fem::SolidElement element;
   std::vector<Vec3> nodes;
 
-  Uniform(const HyperelasticLaw& law, double poisson, bool quadratic) {
+  Uniform(const model::HyperelasticLaw& law, double poisson, bool quadratic) {
     constexpr std::array<Vec3, 4> corners{
         {{0.3, -0.2, 0.1}, {2.1, 0.4, -0.3}, {0.2, 1.7, 0.5}, {0.6, 0.3, 1.4}}};
-    element = solid_element(corners, elasticity(young, poisson));
+    element = fem::solid_element(corners, fem::elasticity(young, poisson));
     element.law = law;
     nodes.assign(corners.begin(), corners.end());
     if (quadratic)
-      for (const auto& [i, j] : tetrahedron_edges)
+      for (const auto& [i, j] : tetrahedra::tetrahedron_edges)
         nodes.push_back((corners[i] + corners[j]) / 2);
   }
-  HyperelasticResponse response(const Matrix3d& f,
-                                HyperelasticPart part = HyperelasticPart::force) const {
+  fem::HyperelasticResponse
+  response(const Matrix3d& f, fem::HyperelasticPart part = fem::HyperelasticPart::force) const {
     std::vector<Vec3> u;
     for (const Vec3& p : nodes) {
       const Vector3d to = f * Vector3d(p.x, p.y, p.z);
       u.push_back(Vec3{to.x(), to.y(), to.z()} - p);
     }
-    HyperelasticResponse r;
-    hyperelastic_response(element, u, {}, part, r);
+    fem::HyperelasticResponse r;
+    fem::hyperelastic_response(element, u, {}, part, r);
     return r;
   }
   /// First Piola-Kirchhoff: the moment of the nodes' forces.
   Matrix3d stress(const Matrix3d& f) const {
-    const HyperelasticResponse r = response(f);
+    const fem::HyperelasticResponse r = response(f);
     Matrix3d sum = Matrix3d::Zero();
     for (std::size_t a = 0; a < nodes.size(); ++a)
       for (int i = 0; i < 3; ++i)
@@ -77,7 +77,8 @@ enum class Mode { uniaxial, equibiaxial, planar };
 constexpr std::array<Mode, 3> modes{Mode::uniaxial, Mode::equibiaxial, Mode::planar};
 
 /// Principal stretches of a material whose free sides carry nothing.
-Vector3d stretches(const HyperelasticLaw& law, const Elasticity& m, Mode mode, double stretch) {
+Vector3d stretches(const model::HyperelasticLaw& law, const fem::Elasticity& m, Mode mode,
+                   double stretch) {
   const auto of = [&](double across) {
     return mode == Mode::uniaxial      ? Vector3d(stretch, across, across)
            : mode == Mode::equibiaxial ? Vector3d(stretch, stretch, across)
@@ -88,18 +89,18 @@ Vector3d stretches(const HyperelasticLaw& law, const Elasticity& m, Mode mode, d
   }));
 }
 
-std::string name_of(const HyperelasticLaw& law, double stretch, Mode mode) {
-  return law_text(law) + ", stretch " + std::to_string(stretch) + ", mode " +
+std::string name_of(const model::HyperelasticLaw& law, double stretch, Mode mode) {
+  return model::law_text(law) + ", stretch " + std::to_string(stretch) + ", mode " +
          std::to_string(static_cast<int>(mode));
 }
 
 TEST(HyperelasticLaws, StressesOfStretchedElementsAreClosedForms) {
   const Matrix3d turn = Eigen::AngleAxisd(0.7, Vector3d(1, -2, 0.5).normalized()).matrix();
-  for (const HyperelasticLaw& law : test::modified_laws)
+  for (const model::HyperelasticLaw& law : test::modified_laws)
     for (const double poisson : {0.3, 0.4999})
       for (const bool quadratic : {false, true}) {
         const Uniform element(law, poisson, quadratic);
-        const Elasticity& m = element.element.material;
+        const fem::Elasticity& m = element.element.material;
         for (double stretch = 0.5; stretch < 3.01; stretch += 0.25)
           for (const Mode mode : modes) {
             const Vector3d s = stretches(law, m, mode, stretch);
@@ -118,7 +119,7 @@ TEST(HyperelasticLaws, StressesOfStretchedElementsAreClosedForms) {
 /// By the textbook's formulas for incompressible materials, as in Ogden, Non-linear elastic
 /// deformations, 1984, sections 4.2 and 4.4: what nearly incompressible ones come to.
 TEST(HyperelasticLaws, NearlyIncompressibleStressesAreThoseOfIncompressibleMaterials) {
-  for (const HyperelasticLaw& law : test::modified_laws) {
+  for (const model::HyperelasticLaw& law : test::modified_laws) {
     const Uniform element(law, 0.4999999, true);
     const double mu = element.element.material.mu;
     const auto& q = law.parameter;
@@ -134,13 +135,13 @@ TEST(HyperelasticLaws, NearlyIncompressibleStressesAreThoseOfIncompressibleMater
         (void)i2;
         double expected = 0; // nominal stress
         switch (law.kind) {
-        case HyperelasticLaw::mooney_rivlin: {
+        case model::HyperelasticLaw::mooney_rivlin: {
           // t_1 - t_3 = 2 (s² - a²) (C10 + C01 other²)
           const double c01 = q[0] * mu, c10 = mu / 2 - c01;
           expected = 2 * (s * s - across * across) * (c10 + c01 * other * other) / s;
           break;
         }
-        case HyperelasticLaw::yeoh:
+        case model::HyperelasticLaw::yeoh:
           expected = 2 * (s * s - across * across) *
                      (mu / 2 + 2 * q[0] * mu * x + 3 * q[1] * mu * x * x) / s;
           break;
@@ -159,11 +160,11 @@ TEST(HyperelasticLaws, NearlyIncompressibleStressesAreThoseOfIncompressibleMater
 
 /// Rivlin's universal relation t_11 - t_22 = shear t_12 besides the closed form.
 TEST(HyperelasticLaws, StressesOfShearedElementsAreClosedForms) {
-  for (const HyperelasticLaw& law : test::modified_laws)
+  for (const model::HyperelasticLaw& law : test::modified_laws)
     for (const bool quadratic : {false, true})
       for (const double shear : {0.01, 0.5, 1.5, 2.6}) {
         const Uniform element(law, 0.4999, quadratic);
-        const Elasticity& m = element.element.material;
+        const fem::Elasticity& m = element.element.material;
         const Matrix3d f{{1, shear, 0}, {0, 1, 0}, {0, 0, 1}};
         // Principal stretches s, 1, 1/s with s - 1/s = shear; along them B has eigenvectors at
         // tan(2 angle) = 2 / shear.
@@ -193,11 +194,12 @@ Matrix3d any_gradient(std::mt19937& random, double size) {
 
 /// Ogden's law with the powers 2 and -2 is Mooney and Rivlin's, and that without C01 is Yeoh's.
 TEST(HyperelasticLaws, LawsThatAreTheSameHaveTheSameTangents) {
-  const std::array<std::array<HyperelasticLaw, 2>, 4> same{{
-      {{{HyperelasticLaw::mooney_rivlin, {}}, {HyperelasticLaw::yeoh, {}}}},
-      {{{HyperelasticLaw::mooney_rivlin, {}}, {HyperelasticLaw::ogden, {2}}}},
-      {{{HyperelasticLaw::mooney_rivlin, {0.5}}, {HyperelasticLaw::ogden, {-2}}}},
-      {{{HyperelasticLaw::mooney_rivlin, {0.15}}, {HyperelasticLaw::ogden, {2, -2, 0.3}}}},
+  const std::array<std::array<model::HyperelasticLaw, 2>, 4> same{{
+      {{{model::HyperelasticLaw::mooney_rivlin, {}}, {model::HyperelasticLaw::yeoh, {}}}},
+      {{{model::HyperelasticLaw::mooney_rivlin, {}}, {model::HyperelasticLaw::ogden, {2}}}},
+      {{{model::HyperelasticLaw::mooney_rivlin, {0.5}}, {model::HyperelasticLaw::ogden, {-2}}}},
+      {{{model::HyperelasticLaw::mooney_rivlin, {0.15}},
+        {model::HyperelasticLaw::ogden, {2, -2, 0.3}}}},
   }};
   std::mt19937 random(3);
   std::vector<Matrix3d> gradients{Matrix3d::Identity(), 1.1 * Matrix3d::Identity()};
@@ -215,9 +217,9 @@ TEST(HyperelasticLaws, LawsThatAreTheSameHaveTheSameTangents) {
       if (f.determinant() < 0.2)
         continue;
       const Uniform one(a, 0.4, false), two(b, 0.4, false);
-      const auto r = one.response(f, HyperelasticPart::tangent),
-                 s = two.response(f, HyperelasticPart::tangent);
-      EXPECT_NEAR(r.energy, s.energy, 1e-13 * (young + r.energy)) << law_text(b);
+      const auto r = one.response(f, fem::HyperelasticPart::tangent),
+                 s = two.response(f, fem::HyperelasticPart::tangent);
+      EXPECT_NEAR(r.energy, s.energy, 1e-13 * (young + r.energy)) << model::law_text(b);
       double force = 0, tangent = 0, size = 0;
       for (std::size_t n = 0; n < 4; ++n)
         force = test::larger(force, norm(r.force[n] - s.force[n]));
@@ -225,20 +227,20 @@ TEST(HyperelasticLaws, LawsThatAreTheSameHaveTheSameTangents) {
         tangent = test::larger(tangent, std::abs(r.tangent[n] - s.tangent[n]));
         size = test::larger(size, std::abs(r.tangent[n]));
       }
-      EXPECT_LE(force, 1e-13 * size) << law_text(b);
-      EXPECT_LE(tangent, 1e-13 * size) << law_text(b);
+      EXPECT_LE(force, 1e-13 * size) << model::law_text(b);
+      EXPECT_LE(tangent, 1e-13 * size) << model::law_text(b);
     }
 }
 
 /// Tangents at close stretches by differences of forces: where their quotients change their form.
 TEST(HyperelasticLaws, TangentsOfCloseStretchesAreDerivatives) {
-  for (const HyperelasticLaw& law : test::modified_laws)
+  for (const model::HyperelasticLaw& law : test::modified_laws)
     for (const double apart : {0.0, 1e-13, 1e-8, 1e-4, 0.01, 0.015, 0.017, 0.03}) {
       const Uniform element(law, 0.45, false);
       const Matrix3d f = Eigen::AngleAxisd(0.4, Vector3d(3, 1, 2).normalized()) *
                          Vector3d(1.3, 1.3 + apart, 0.9).asDiagonal() *
                          Eigen::AngleAxisd(1.4, Vector3d(1, -1, 2).normalized());
-      const auto r = element.response(f, HyperelasticPart::tangent);
+      const auto r = element.response(f, fem::HyperelasticPart::tangent);
       double worst = 0, size = 0;
       const double h = 1e-4;
       std::vector<Vec3> u(4);
@@ -253,8 +255,8 @@ TEST(HyperelasticLaws, TangentsOfCloseStretchesAreDerivatives) {
                  {{-2, 1.0 / 12}, {-1, -8.0 / 12}, {1, 8.0 / 12}, {2, -1.0 / 12}}}) {
           std::vector<Vec3> there = u;
           there[n / 3][static_cast<int>(n % 3)] += step * h;
-          HyperelasticResponse s;
-          hyperelastic_response(element.element, there, {}, HyperelasticPart::force, s);
+          fem::HyperelasticResponse s;
+          fem::hyperelastic_response(element.element, there, {}, fem::HyperelasticPart::force, s);
           for (std::size_t a = 0; a < 4; ++a)
             change[a] += weight / h * s.force[a];
         }
@@ -264,13 +266,13 @@ TEST(HyperelasticLaws, TangentsOfCloseStretchesAreDerivatives) {
           size = test::larger(size, std::abs(k));
         }
       }
-      EXPECT_LE(worst, 1e-9 * size) << law_text(law) << ' ' << apart;
+      EXPECT_LE(worst, 1e-9 * size) << model::law_text(law) << ' ' << apart;
     }
 }
 
 /// A shrunk or mirrored element grows back: no balance on the way.
 TEST(HyperelasticLaws, CollapsedElementsUnfold) {
-  for (const HyperelasticLaw& law : test::modified_laws)
+  for (const model::HyperelasticLaw& law : test::modified_laws)
     for (const double poisson : {0.0, 0.3, 0.49})
       for (double scale = -1.005; scale < 0.99; scale += 0.01) {
         const Uniform element(law, poisson, false);
@@ -285,12 +287,12 @@ TEST(HyperelasticLaws, CollapsedElementsUnfold) {
 
 /// A box whose sides are moved.
 struct Box {
-  TetMesh mesh;
-  std::vector<SolidElement> elements;
+  tetrahedra::TetMesh mesh;
+  std::vector<fem::SolidElement> elements;
   std::vector<std::uint8_t> fixed;
   std::vector<double> prescribed;
 
-  Box(const HyperelasticLaw& law, double poisson, bool quadratic, bool distorted)
+  Box(const model::HyperelasticLaw& law, double poisson, bool quadratic, bool distorted)
       : mesh(test::box_tetrahedra(2, 2, 2)) {
     std::mt19937 random(11);
     std::uniform_real_distribution<double> any(-1, 1);
@@ -299,8 +301,8 @@ struct Box {
         if (distorted && p[axis] == 1) // sides stay where they are
           p[axis] += 0.25 * any(random);
     if (quadratic)
-      make_quadratic(mesh);
-    elements = solid_elements(mesh, std::array{SolidMaterial{young, poisson, 1, law}});
+      tetrahedra::make_quadratic(mesh);
+    elements = fem::solid_elements(mesh, std::array{fem::SolidMaterial{young, poisson, 1, law}});
     fixed.resize(3 * mesh.points.size());
     prescribed.resize(fixed.size());
   }
@@ -311,13 +313,13 @@ struct Box {
         prescribed[3 * i + static_cast<std::size_t>(axis)] = by;
       }
   }
-  HyperelasticState solve() const {
-    return hyperelastic_statics(mesh, elements, fixed, prescribed,
-                                {std::vector<double>(fixed.size()), {}});
+  fit::HyperelasticState solve() const {
+    return fit::hyperelastic_statics(mesh, elements, fixed, prescribed,
+                                     {std::vector<double>(fixed.size()), {}});
   }
   /// First Piola-Kirchhoff stress, its mean: the moment of the forces that hold the box.
-  Matrix3d mean_stress(const HyperelasticState& state) const {
-    const SolidVector f = hyperelastic_forces(mesh, elements, state.displacement);
+  Matrix3d mean_stress(const fit::HyperelasticState& state) const {
+    const fit::SolidVector f = fit::hyperelastic_forces(mesh, elements, state.displacement);
     Matrix3d sum = Matrix3d::Zero();
     for (std::size_t i = 0; i < mesh.points.size(); ++i)
       for (int row = 0; row < 3; ++row)
@@ -327,8 +329,8 @@ struct Box {
     return sum;
   }
   /// Force on a side.
-  Vec3 pull(const HyperelasticState& state, int axis) const {
-    const SolidVector f = hyperelastic_forces(mesh, elements, state.displacement);
+  Vec3 pull(const fit::HyperelasticState& state, int axis) const {
+    const fit::SolidVector f = fit::hyperelastic_forces(mesh, elements, state.displacement);
     Vec3 sum;
     for (std::size_t i = 0; i < mesh.points.size(); ++i)
       if (mesh.points[i][axis] == 2)
@@ -342,7 +344,7 @@ struct Box {
 /// are less compressed than elements.
 TEST(HyperelasticLaws, StretchedMeshesAreClosedForms) {
   std::size_t n = 0; // each kind of mesh is met by each law
-  for (const HyperelasticLaw& law : test::modified_laws)
+  for (const model::HyperelasticLaw& law : test::modified_laws)
     for (const Mode mode : modes)
       for (const double stretch : {mode == Mode::uniaxial ? 0.5 : 0.75, 1.6, 3.0}) {
         const bool quadratic = n % 2 != 0, distorted = n / 2 % 2 != 0;
@@ -355,9 +357,9 @@ TEST(HyperelasticLaws, StretchedMeshesAreClosedForms) {
         box.hold(0, 2, 2 * (stretch - 1));
         if (mode != Mode::uniaxial)
           box.hold(1, 2, mode == Mode::planar ? 0 : 2 * (stretch - 1));
-        HyperelasticState state;
+        fit::HyperelasticState state;
         ASSERT_NO_THROW(state = box.solve());
-        const Elasticity m = elasticity(young, 0.4995);
+        const fem::Elasticity m = fem::elasticity(young, 0.4995);
         const Vector3d s = stretches(law, m, mode, stretch), p = test::principal_stress(law, m, s);
         for (int axis = 0; axis < 2; ++axis)
           EXPECT_NEAR(box.pull(state, axis)[axis] / 4, p[axis], 1e-6 * (m.mu + p.norm()))
@@ -374,7 +376,7 @@ TEST(HyperelasticLaws, PatchesFollowUniformGradients) {
   const Matrix3d shear{{1, 1.2, 0}, {0, 1, 0}, {0, 0, 1}},
       other = Eigen::AngleAxisd(0.6, Vector3d(1, 2, -1).normalized()) *
               Matrix3d{{1.5, 0.3, -0.2}, {0.1, 0.8, 0.2}, {0, -0.3, 0.9}};
-  for (const HyperelasticLaw& law : test::modified_laws)
+  for (const model::HyperelasticLaw& law : test::modified_laws)
     for (const bool quadratic : {false, true})
       for (const Matrix3d& f : {shear, other}) {
         Box box(law, 0.495, quadratic, true);
@@ -388,7 +390,7 @@ TEST(HyperelasticLaws, PatchesFollowUniformGradients) {
                 box.prescribed[3 * i + static_cast<std::size_t>(axis)] = u[axis];
               }
         }
-        const HyperelasticState state = box.solve();
+        const fit::HyperelasticState state = box.solve();
         double worst = 0;
         for (std::size_t i = 0; i < box.mesh.points.size(); ++i) {
           const Vec3& p = box.mesh.points[i];
@@ -398,45 +400,45 @@ TEST(HyperelasticLaws, PatchesFollowUniformGradients) {
                 worst, std::abs(state.displacement.axes[3 * i + static_cast<std::size_t>(axis)] -
                                 u[axis]));
         }
-        EXPECT_LE(worst, 1e-9) << law_text(law);
-        const Matrix3d expected = test::first_piola(law, elasticity(young, 0.495), f);
+        EXPECT_LE(worst, 1e-9) << model::law_text(law);
+        const Matrix3d expected = test::first_piola(law, fem::elasticity(young, 0.495), f);
         EXPECT_LE((box.mean_stress(state) - expected).norm(), 1e-8 * (young + expected.norm()));
       }
 }
 
 /// Of each kind one, for time's sake.
-const std::array<HyperelasticLaw, 3> moving_laws{test::modified_laws[1], test::modified_laws[2],
-                                                 test::modified_laws[7]};
+const std::array<model::HyperelasticLaw, 3> moving_laws{
+    test::modified_laws[1], test::modified_laws[2], test::modified_laws[7]};
 
 /// A bar that is held at one end.
 struct Bar {
-  TetMesh mesh = test::box_tetrahedra(4, 1, 1, 5);
-  std::vector<SolidMaterial> materials;
+  tetrahedra::TetMesh mesh = test::box_tetrahedra(4, 1, 1, 5);
+  std::vector<fem::SolidMaterial> materials;
   std::vector<std::uint8_t> fixed;
 
-  Bar(const HyperelasticLaw& law, bool quadratic) : materials{{2e4, 0.47, 1e-3, law}} {
+  Bar(const model::HyperelasticLaw& law, bool quadratic) : materials{{2e4, 0.47, 1e-3, law}} {
     if (quadratic)
-      make_quadratic(mesh);
+      tetrahedra::make_quadratic(mesh);
     for (const Vec3& p : mesh.points)
       fixed.insert(fixed.end(), 3, p.x == 0 ? 1 : 0);
   }
-  SolidMotion moving() const {
-    SolidMotionOptions options;
-    options.law = SolidLaw::hyperelastic;
+  integrator::SolidMotion moving() const {
+    integrator::SolidMotionOptions options;
+    options.law = integrator::SolidLaw::hyperelastic;
     options.tolerance = 1e-6;
     options.max_rounds = 100;
-    SolidMotion motion(mesh, materials, options);
+    integrator::SolidMotion motion(mesh, materials, options);
     motion.hold(fixed);
     return motion;
   }
 };
 
 TEST(HyperelasticLaws, MovingSolidsComeToRestWhereTheyAreInBalance) {
-  for (const HyperelasticLaw& law : moving_laws)
+  for (const model::HyperelasticLaw& law : moving_laws)
     for (const bool quadratic : {false, true}) {
       const Bar bar(law, quadratic);
-      SolidMotion moving = bar.moving();
-      SolidVector load{std::vector<double>(bar.fixed.size()), {}};
+      integrator::SolidMotion moving = bar.moving();
+      fit::SolidVector load{std::vector<double>(bar.fixed.size()), {}};
       for (std::size_t n = 0; n < bar.mesh.points.size(); ++n) {
         load.axes[3 * n] = 4e5 * moving.masses()[n];
         load.axes[3 * n + 2] = 3e4 * moving.masses()[n];
@@ -446,24 +448,24 @@ TEST(HyperelasticLaws, MovingSolidsComeToRestWhereTheyAreInBalance) {
         (void)moving.step(1, {});
       const std::vector<double> found = moving.displacement();
       const std::vector<double> expected =
-          hyperelastic_statics(bar.mesh, solid_elements(bar.mesh, bar.materials), bar.fixed, {},
-                               load)
+          fit::hyperelastic_statics(bar.mesh, fem::solid_elements(bar.mesh, bar.materials),
+                                    bar.fixed, {}, load)
               .displacement.axes;
       double worst = 0, most = 0;
       for (std::size_t axis = 0; axis < found.size(); ++axis) {
         worst = test::larger(worst, std::abs(found[axis] - expected[axis]));
         most = test::larger(most, std::abs(expected[axis]));
       }
-      EXPECT_GT(most, 2) << law_text(law);
-      EXPECT_LE(worst, 1e-4 * most) << law_text(law) << ' ' << quadratic;
+      EXPECT_GT(most, 2) << model::law_text(law);
+      EXPECT_LE(worst, 1e-4 * most) << model::law_text(law) << ' ' << quadratic;
     }
 }
 
 TEST(HyperelasticLaws, SolidsThatAreMirroredFindBack) {
-  for (const HyperelasticLaw& law : moving_laws)
+  for (const model::HyperelasticLaw& law : moving_laws)
     for (const bool quadratic : {false, true}) {
       const Bar bar(law, quadratic);
-      SolidMotion moving = bar.moving();
+      integrator::SolidMotion moving = bar.moving();
       // Folded into its own first quarter, without velocity.
       std::vector<double> u(bar.fixed.size());
       for (std::size_t n = 0; n < bar.mesh.points.size(); ++n)
@@ -473,9 +475,9 @@ TEST(HyperelasticLaws, SolidsThatAreMirroredFindBack) {
       EXPECT_TRUE(std::isfinite(folded));
       for (int n = 0; n < 60; ++n)
         (void)moving.step(0.1, {});
-      EXPECT_LE(moving.elastic_energy(), 1e-6 * folded) << law_text(law) << ' ' << quadratic;
+      EXPECT_LE(moving.elastic_energy(), 1e-6 * folded) << model::law_text(law) << ' ' << quadratic;
     }
 }
 
 } // namespace
-} // namespace gewebe
+} // namespace gewebe::test

@@ -15,46 +15,49 @@
 #include <set>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::test {
 namespace {
 
 const double half = std::sqrt(0.5);
 
 TEST(Instrument, TurnsAreRotations) {
-  const Quaternion quarter = turn_about({0, 0, 2}, 90);
-  EXPECT_LT(norm(rotated(quarter, {1, 2, 3}) - Vec3{-2, 1, 3}), 1e-15);
-  EXPECT_LT(norm(rotated_back(quarter, rotated(quarter, {1, 2, 3})) - Vec3{1, 2, 3}), 1e-15);
-  EXPECT_EQ(unit({0, 0, 0, 1e-200}), (Quaternion{0, 0, 0, 1}));
-  EXPECT_EQ(unit({1e300, 0, 0, 0}), Quaternion{});
-  const Pose pose{{5, 0, 0}, quarter};
+  const contact::Quaternion quarter = contact::turn_about({0, 0, 2}, 90);
+  EXPECT_LT(norm(contact::rotated(quarter, {1, 2, 3}) - Vec3{-2, 1, 3}), 1e-15);
+  EXPECT_LT(
+      norm(contact::rotated_back(quarter, contact::rotated(quarter, {1, 2, 3})) - Vec3{1, 2, 3}),
+      1e-15);
+  EXPECT_EQ(contact::unit({0, 0, 0, 1e-200}), (contact::Quaternion{0, 0, 0, 1}));
+  EXPECT_EQ(contact::unit({1e300, 0, 0, 0}), contact::Quaternion{});
+  const contact::Pose pose{{5, 0, 0}, quarter};
   EXPECT_LT(norm(pose({1, 0, 0}) - Vec3{5, 1, 0}), 1e-15);
   EXPECT_LT(norm(pose.inverse(pose({1, 2, 3})) - Vec3{1, 2, 3}), 1e-15);
 }
 
 TEST(Instrument, AWayIsSmoothAndTakesTheShorterTurn) {
-  Quaternion end = turn_about({0, 0, 1}, 90);
+  contact::Quaternion end = contact::turn_about({0, 0, 1}, 90);
   end = {-end.w, -end.x, -end.y, -end.z}; // the same turn
-  const PoseWay way{{}, {{2, 0, 0}, end}, 1, 3};
+  const contact::PoseWay way{{}, {{2, 0, 0}, end}, 1, 3};
   EXPECT_EQ(way.at(0), way.from);
   EXPECT_EQ(way.at(1), way.from);
   EXPECT_EQ(way.at(3), way.to);
   EXPECT_EQ(way.at(9), way.to);
-  const Pose middle = way.at(2);
+  const contact::Pose middle = way.at(2);
   EXPECT_LT(norm(middle.place - Vec3{1, 0, 0}), 1e-15);
-  EXPECT_LT(norm(rotated(middle.turn, {1, 0, 0}) - Vec3{half, half, 0}), 1e-15);
+  EXPECT_LT(norm(contact::rotated(middle.turn, {1, 0, 0}) - Vec3{half, half, 0}), 1e-15);
   EXPECT_LT(norm(way.at(1.01).place), 2e-4); // slow at first
-  const PoseWay jump{{}, {{2, 0, 0}, {}}, 1, 1};
+  const contact::PoseWay jump{{}, {{2, 0, 0}, {}}, 1, 1};
   EXPECT_EQ(jump.at(1), jump.to);
 }
 
 TEST(Instrument, DistancesOfSphereAndCapsule) {
-  const PlacedInstrument sphere({2, {}, 0}, {{1, 0, 0}, {}});
+  const contact::PlacedInstrument sphere({2, {}, 0}, {{1, 0, 0}, {}});
   EXPECT_EQ(sphere.distance({1, 0, 5}), 3);
   EXPECT_EQ(sphere.distance({1, 0.5, 0}), -1.5);
   EXPECT_EQ(sphere.normal({1, 0.5, 0}), (Vec3{0, 1, 0}));
   EXPECT_EQ(sphere.support({0, 0, -1}), 2);
   // Turned so that its segment goes from (1, 0, 0) to (1, 4, 0).
-  const PlacedInstrument capsule({1, {4, 0, 0}, 0}, {{1, 0, 0}, turn_about({0, 0, 1}, 90)});
+  const contact::PlacedInstrument capsule({1, {4, 0, 0}, 0},
+                                          {{1, 0, 0}, contact::turn_about({0, 0, 1}, 90)});
   EXPECT_NEAR(capsule.distance({1, 7, 0}), 2, 1e-14);
   EXPECT_NEAR(capsule.distance({1, -1, 0}), 0, 1e-14);
   EXPECT_NEAR(capsule.distance({3, 2, 0}), 1, 1e-14);
@@ -65,10 +68,10 @@ TEST(Instrument, DistancesOfSphereAndCapsule) {
 }
 
 TEST(Instrument, WhereThereIsNoNormalTheWishIsTaken) {
-  const PlacedInstrument sphere({2, {}, 0}, {{1, 0, 0}, {}});
+  const contact::PlacedInstrument sphere({2, {}, 0}, {{1, 0, 0}, {}});
   EXPECT_EQ(sphere.normal({1, 0, 0}, {0, -3, 0}), (Vec3{0, -1, 0}));
   EXPECT_EQ(norm(sphere.normal({1, 0, 0})), 1);
-  const PlacedInstrument capsule({1, {4, 0, 0}, 0}, {});
+  const contact::PlacedInstrument capsule({1, {4, 0, 0}, 0}, {});
   EXPECT_LT(norm(capsule.normal({2, 0, 0}, {5, 0, 2}) - Vec3{0, 0, 1}), 1e-15);
   for (const Vec3 wish : {Vec3{}, Vec3{1, 0, 0}}) {
     const Vec3 n = capsule.normal({2, 0, 0}, wish);
@@ -78,7 +81,8 @@ TEST(Instrument, WhereThereIsNoNormalTheWishIsTaken) {
 }
 
 TEST(Instrument, BeyondAnySupportPlaneIsOutside) {
-  const PlacedInstrument capsule({0.7, {1, 2, 3}, 0}, {{4, 5, 6}, turn_about({1, 1, 0}, 33)});
+  const contact::PlacedInstrument capsule({0.7, {1, 2, 3}, 0},
+                                          {{4, 5, 6}, contact::turn_about({1, 1, 0}, 33)});
   for (int k = 0; k < 500; ++k) {
     const Vec3 v{std::sin(1.0 * k), std::sin(1.7 * k + 1), std::sin(2.3 * k + 2)};
     const Vec3 n = v / norm(v), across = cross(n, {0.3, 0.4, 0.5});
@@ -89,27 +93,27 @@ TEST(Instrument, BeyondAnySupportPlaneIsOutside) {
 }
 
 TEST(Instrument, NoPointMovesFurther) {
-  const InstrumentShape shape{0.5, {3, 0, 0}, 0};
+  const contact::InstrumentShape shape{0.5, {3, 0, 0}, 0};
   for (const double degrees : {0.0, 1.0, 45.0, 179.0, 180.0}) {
-    const Pose from{{1, 2, 3}, turn_about({0, 1, 0}, 20)};
-    const Pose to{{1.5, 2, 2}, turn_about({0.1, 1, 0.3}, 20 + degrees)};
+    const contact::Pose from{{1, 2, 3}, contact::turn_about({0, 1, 0}, 20)};
+    const contact::Pose to{{1.5, 2, 2}, contact::turn_about({0.1, 1, 0.3}, 20 + degrees)};
     double way = 0;
     Vec3 before = from(shape.axis);
     for (int k = 1; k <= 1000; ++k) {
-      const Vec3 now = between(from, to, k / 1000.0)(shape.axis);
+      const Vec3 now = contact::between(from, to, k / 1000.0)(shape.axis);
       way += norm(now - before);
       before = now;
     }
-    EXPECT_LE(way, path_length(shape, from, to) * (1 + 1e-9));
+    EXPECT_LE(way, contact::path_length(shape, from, to) * (1 + 1e-9));
     EXPECT_GE(way, norm(to.place - from.place) / 4);
   }
-  EXPECT_EQ(path_length(shape, {}, {}), 0);
+  EXPECT_EQ(contact::path_length(shape, {}, {}), 0);
 }
 
 TEST(Instrument, ACarriedNodeFollowsTheTurn) {
   const Vec3 rest{1, 0, 0};
-  const PoseWay way{{}, {{0, 0, 2}, turn_about({0, 0, 1}, 180)}, 0, 1};
-  const Ramp ramp{{}, {-2, 0, 2}, 0, 1, Carrier{way, rest, rest}};
+  const contact::PoseWay way{{}, {{0, 0, 2}, contact::turn_about({0, 0, 1}, 180)}, 0, 1};
+  const contact::Ramp ramp{{}, {-2, 0, 2}, 0, 1, contact::Carrier{way, rest, rest}};
   EXPECT_EQ(ramp.at(0), Vec3{});
   EXPECT_EQ(ramp.at(1), (Vec3{-2, 0, 2}));
   const Vec3 middle = rest + ramp.at(0.5);
@@ -121,8 +125,8 @@ TEST(Instrument, ItsSurfaceIsClosedRoundAndItsOwn) {
     for (const std::size_t along : {std::size_t{1}, std::size_t{5}})
       for (const std::size_t around : {std::size_t{4}, std::size_t{32}, std::size_t{128}}) {
         const double radius = 2.5, pi = std::acos(-1.0);
-        const InstrumentSurface made = round_surface(radius, axis, around, along);
-        const PlacedInstrument placed({.radius = radius, .axis = axis}, {});
+        const contact::InstrumentSurface made = contact::round_surface(radius, axis, around, along);
+        const contact::PlacedInstrument placed({.radius = radius, .axis = axis}, {});
         ASSERT_EQ(made.points.size(), made.normals.size());
         for (std::size_t i = 0; i < made.points.size(); ++i) {
           EXPECT_LT(std::fabs(placed.distance(made.points[i])), 1e-14);
@@ -147,4 +151,4 @@ TEST(Instrument, ItsSurfaceIsClosedRoundAndItsOwn) {
 }
 
 } // namespace
-} // namespace gewebe
+} // namespace gewebe::test

@@ -19,9 +19,9 @@ using namespace gewebe;
 namespace {
 
 /// The voxels whose centre (in mm along the axes from voxel (0, 0, 0)) is inside.
-LabelMask mask_of(const Int3& size, const Vec3& spacing,
-                  const std::function<bool(const Vec3&)>& inside) {
-  LabelMask mask;
+labels::LabelMask mask_of(const Int3& size, const Vec3& spacing,
+                          const std::function<bool(const Vec3&)>& inside) {
+  labels::LabelMask mask;
   mask.size = size;
   mask.transform.m = {spacing.x, 0, 0, 0, 0, spacing.y, 0, 0, 0, 0, spacing.z, 0};
   mask.bits.resize(mask.row(0, size[2]));
@@ -35,7 +35,7 @@ LabelMask mask_of(const Int3& size, const Vec3& spacing,
 }
 
 /// Turns a mask of axis-parallel lattice about axes, mirrors it, and moves it.
-void place(LabelMask& mask, double angle, bool mirrored) {
+void place(labels::LabelMask& mask, double angle, bool mirrored) {
   const double c = std::cos(angle), s = std::sin(angle);
   std::array<double, 12>& m = mask.transform.m;
   const Vec3 spacing{m[0], m[5], m[10]};
@@ -62,10 +62,10 @@ struct Solid {
 };
 
 /// The surface at 0.5, proven closed, manifold and outward.
-Solid solid_of(const Grid& grid) {
+Solid solid_of(const volume::Grid& grid) {
   Solid solid;
-  solid.mesh = marching_cubes({}, grid).mesh;
-  const MeshReport report = examine_mesh(solid.mesh);
+  solid.mesh = surface::marching_cubes({}, grid).mesh;
+  const mesh::MeshReport report = mesh::examine_mesh(solid.mesh);
   EXPECT_TRUE(report.closed() && report.manifold() && report.outward());
   Vec3 moment;
   for (const Triangle& t : solid.mesh.triangles) {
@@ -106,13 +106,13 @@ TEST(LabelDensity, EveryCentreKeepsItsSide) {
   // Random blobs with thin parts; at the default voxel of equal spacings the centres are the
   // labels' own.
   std::uint32_t seed = 1;
-  const LabelMask mask = mask_of({37, 29, 23}, {1, 1, 1}, [&](const Vec3& p) {
+  const labels::LabelMask mask = mask_of({37, 29, 23}, {1, 1, 1}, [&](const Vec3& p) {
     seed = seed * 1664525 + 1013904223;
     return (seed >> 30) == 0 || norm(p - Vec3{18, 14, 11}) < 8 || (p.x == 3 && p.y == 20);
   });
-  LabelDensityReport report;
-  const Grid grid = label_density({}, mask, {}, &report);
-  GridAccessor value(grid);
+  labels::LabelDensityReport report;
+  const volume::Grid grid = labels::label_density({}, mask, {}, &report);
+  volume::GridAccessor value(grid);
   for (std::int32_t k = -2; k < 25; ++k)
     for (std::int32_t j = -2; j < 31; ++j)
       for (std::int32_t i = -2; i < 39; ++i)
@@ -139,13 +139,13 @@ TEST(LabelDensity, BallsKeepVolumeAndPlaceOnAllLattices) {
       const Int3 size{count(spacing.x), count(spacing.y), count(spacing.z)};
       const Vec3 centre{spacing.x * (size[0] / 2.0 + 0.3), spacing.y * (size[1] / 2.0 - 0.1),
                         spacing.z * (size[2] / 2.0 + 0.2)};
-      LabelMask mask =
+      labels::LabelMask mask =
           mask_of(size, spacing, [&](const Vec3& p) { return norm(p - centre) < radius; });
       place(mask, angle, mirrored);
       const Vec3 there = mask.transform.to_world(
           {centre.x / spacing.x, centre.y / spacing.y, centre.z / spacing.z});
-      LabelDensityReport report;
-      const Grid grid = label_density({}, mask, {}, &report);
+      labels::LabelDensityReport report;
+      const volume::Grid grid = labels::label_density({}, mask, {}, &report);
       EXPECT_TRUE(grid.info().transform.is_cubic());
       EXPECT_LT(report.shear, 1e-12);
       const Solid solid = solid_of(grid);
@@ -162,10 +162,10 @@ TEST(LabelDensity, BallsKeepVolumeAndPlaceOnAllLattices) {
 }
 
 TEST(LabelDensity, AnAlignedBoxKeepsItsFacesAndVolume) {
-  const LabelMask mask = mask_of({30, 30, 20}, {1, 1, 2}, [](const Vec3& p) {
+  const labels::LabelMask mask = mask_of({30, 30, 20}, {1, 1, 2}, [](const Vec3& p) {
     return p.x >= 5 && p.x <= 24 && p.y >= 5 && p.y <= 24 && p.z >= 6 && p.z <= 32;
   });
-  const Solid solid = solid_of(label_density({}, mask, {}));
+  const Solid solid = solid_of(labels::label_density({}, mask, {}));
   const Box3 box = bounding_box(solid.mesh);
   // Half a voxel beyond the outermost centres.
   EXPECT_LT(norm(box.min - Vec3{4.5, 4.5, 5}), 0.75);
@@ -186,8 +186,9 @@ TEST(LabelDensity, ObliquePlanesLoseTheirStairs) {
     const auto height = [&](const Vec3& p) {
       return p.z - middle.z - slope * (p.x - middle.x) - 0.3 * slope * (p.y - middle.y);
     };
-    const LabelMask mask = mask_of(size, {1, 1, dz}, [&](const Vec3& p) { return height(p) < 0; });
-    TriangleMesh mesh = solid_of(label_density({}, mask, {})).mesh;
+    const labels::LabelMask mask =
+        mask_of(size, {1, 1, dz}, [&](const Vec3& p) { return height(p) < 0; });
+    TriangleMesh mesh = solid_of(labels::label_density({}, mask, {})).mesh;
     std::erase_if(mesh.points, [&](const Vec3& p) {
       return p.x < 12 || p.x > size[0] - 13 || p.y < 12 || p.y > size[1] - 13 || p.z < 3 * dz ||
              p.z > (size[2] - 4) * dz;
@@ -200,38 +201,38 @@ TEST(LabelDensity, ObliquePlanesLoseTheirStairs) {
 
 TEST(LabelDensity, WhatTheEdgeCutsOffIsClosed) {
   // All of the volume, and a ball of which half lies outside.
-  const LabelMask all = mask_of({9, 7, 5}, {2, 2, 3}, [](const Vec3&) { return true; });
-  const Solid block = solid_of(label_density({}, all, {}));
+  const labels::LabelMask all = mask_of({9, 7, 5}, {2, 2, 3}, [](const Vec3&) { return true; });
+  const Solid block = solid_of(labels::label_density({}, all, {}));
   EXPECT_NEAR(block.volume / (18.0 * 14 * 15), 1, 0.04);
-  const LabelMask half = mask_of({40, 40, 20}, {1, 1, 1}, [](const Vec3& p) {
+  const labels::LabelMask half = mask_of({40, 40, 20}, {1, 1, 1}, [](const Vec3& p) {
     return norm(p - Vec3{20, 20, 0}) < 14;
   });
-  const Solid cut = solid_of(label_density({}, half, {}));
+  const Solid cut = solid_of(labels::label_density({}, half, {}));
   // Half a slice more than the half ball.
   EXPECT_NEAR(cut.volume / (ball_volume(14) / 2 + 0.5 * std::numbers::pi * 196), 1, 0.01);
   EXPECT_NEAR(bounding_box(cut.mesh).min.z, -0.5, 0.3);
 }
 
 TEST(LabelDensity, ASingleVoxelAndASingleSlice) {
-  const LabelMask one = mask_of({3, 3, 3}, {1, 1, 1}, [](const Vec3& p) {
+  const labels::LabelMask one = mask_of({3, 3, 3}, {1, 1, 1}, [](const Vec3& p) {
     return p == Vec3{1, 1, 1};
   });
-  EXPECT_LT(norm(solid_of(label_density({}, one, {})).centroid - Vec3{1, 1, 1}), 1e-6);
-  const LabelMask slice = mask_of({40, 40, 1}, {1, 1, 4}, [](const Vec3& p) {
+  EXPECT_LT(norm(solid_of(labels::label_density({}, one, {})).centroid - Vec3{1, 1, 1}), 1e-6);
+  const labels::LabelMask slice = mask_of({40, 40, 1}, {1, 1, 4}, [](const Vec3& p) {
     return norm(p - Vec3{20, 20, 0}) < 15;
   });
-  const Solid disc = solid_of(label_density({}, slice, {}));
+  const Solid disc = solid_of(labels::label_density({}, slice, {}));
   EXPECT_NEAR(disc.volume / (std::numbers::pi * 225 * 4), 1, 0.35);
 }
 
 TEST(LabelDensity, InteriorsAreTiles) {
-  const LabelMask mask = mask_of({96, 96, 96}, {1, 1, 1}, [](const Vec3& p) {
+  const labels::LabelMask mask = mask_of({96, 96, 96}, {1, 1, 1}, [](const Vec3& p) {
     return norm(p - Vec3{48, 48, 48}) < 44;
   });
-  LabelDensityReport report;
-  const Grid grid = label_density({}, mask, {}, &report);
+  labels::LabelDensityReport report;
+  const volume::Grid grid = labels::label_density({}, mask, {}, &report);
   std::uint64_t voxels_of_tiles = 0;
-  for (const TileView& tile : grid.tiles())
+  for (const volume::TileView& tile : grid.tiles())
     voxels_of_tiles += static_cast<std::uint64_t>(tile.dim) * static_cast<std::uint64_t>(tile.dim) *
                        static_cast<std::uint64_t>(tile.dim);
   EXPECT_GT(voxels_of_tiles, report.voxels / 3);
@@ -239,44 +240,45 @@ TEST(LabelDensity, InteriorsAreTiles) {
 }
 
 TEST(LabelDensity, ThreadsAndProcessorsGiveTheSameBytes) {
-  const LabelMask mask = mask_of({31, 23, 11}, {0.7, 0.9, 2}, [](const Vec3& p) {
+  const labels::LabelMask mask = mask_of({31, 23, 11}, {0.7, 0.9, 2}, [](const Vec3& p) {
     return norm(p - Vec3{12, 10, 12}) < 7 || std::fabs(p.x - p.z) < 2;
   });
   Context context;
   context.threads = 1;
   context.cpu = CpuLevel::baseline;
-  const std::uint64_t digest = label_density(context, mask, {}).digest();
+  const std::uint64_t digest = labels::label_density(context, mask, {}).digest();
   for (const auto& [threads, level] : {std::pair(5, "baseline"), {1, "avx2"}, {2, "avx512"}}) {
     context.threads = threads;
     context.cpu = cpu_level_from_name(level);
-    EXPECT_EQ(label_density(context, mask, {}).digest(), digest) << threads << ' ' << level;
+    EXPECT_EQ(labels::label_density(context, mask, {}).digest(), digest) << threads << ' ' << level;
   }
-  EXPECT_NE(label_density(context, mask, {.voxel = 0.8}).digest(), digest); // negative control
+  EXPECT_NE(labels::label_density(context, mask, {.voxel = 0.8}).digest(),
+            digest); // negative control
 }
 
 TEST(LabelDensity, ObliqueAxesAreRefusedAndRoundingIsNot) {
-  LabelMask mask = mask_of({50, 50, 50}, {1, 1, 1}, [](const Vec3& p) {
+  labels::LabelMask mask = mask_of({50, 50, 50}, {1, 1, 1}, [](const Vec3& p) {
     return norm(p - Vec3{25, 25, 25}) < 10;
   });
   mask.transform.m[1] = 1e-7;
-  LabelDensityReport report;
-  const Grid grid = label_density({}, mask, {}, &report);
+  labels::LabelDensityReport report;
+  const volume::Grid grid = labels::label_density({}, mask, {}, &report);
   EXPECT_TRUE(grid.info().transform.is_cubic());
   EXPECT_GT(report.shear, 1e-6);
   EXPECT_LT(report.shear, 1e-5);
   mask.transform.m[1] = 0.2;
-  EXPECT_THROW((void)label_density({}, mask, {}), Error);
+  EXPECT_THROW((void)labels::label_density({}, mask, {}), Error);
 }
 
 TEST(LabelDensity, SizesAreRefusedBeforeTheWork) {
-  const LabelMask mask = mask_of({50, 50, 50}, {1, 1, 1}, [](const Vec3& p) {
+  const labels::LabelMask mask = mask_of({50, 50, 50}, {1, 1, 1}, [](const Vec3& p) {
     return norm(p - Vec3{25, 25, 25}) < 10;
   });
   Context context;
   context.max_memory = 1 << 20;
-  EXPECT_THROW((void)label_density(context, mask, {}), Error);
-  EXPECT_THROW((void)label_density({}, mask, {.voxel = 6.5}), Error);
+  EXPECT_THROW((void)labels::label_density(context, mask, {}), Error);
+  EXPECT_THROW((void)labels::label_density({}, mask, {.voxel = 6.5}), Error);
   context.max_memory = std::uint64_t{1} << 30U;
-  EXPECT_NO_THROW((void)label_density(context, mask, {.voxel = 5.5}));
-  EXPECT_THROW((void)label_density(context, mask, {.voxel = 1e-5}), Error);
+  EXPECT_NO_THROW((void)labels::label_density(context, mask, {.voxel = 5.5}));
+  EXPECT_THROW((void)labels::label_density(context, mask, {.voxel = 1e-5}), Error);
 }

@@ -16,6 +16,7 @@
 #include <fstream>
 
 using namespace gewebe;
+using namespace gewebe::test;
 
 namespace {
 
@@ -130,11 +131,13 @@ std::string gzipped(const std::string& bytes) {
   return deflated(bytes, 31);
 }
 
-LabelVolume read(const std::string& bytes, const std::vector<LabelRange>& labels = {{9, 9}}) {
-  return label_volume_from_bytes(bytes, "test", labels, {});
+formats::LabelVolume read(const std::string& bytes,
+                          const std::vector<formats::LabelRange>& labels = {{9, 9}}) {
+  return formats::label_volume_from_bytes(bytes, "test", labels, {});
 }
 
-std::string message(const std::string& bytes, const std::vector<LabelRange>& labels = {{9, 9}}) {
+std::string message(const std::string& bytes,
+                    const std::vector<formats::LabelRange>& labels = {{9, 9}}) {
   try {
     (void)read(bytes, labels);
   } catch (const Error& error) {
@@ -144,7 +147,7 @@ std::string message(const std::string& bytes, const std::vector<LabelRange>& lab
 }
 
 void expect_sample(const std::string& bytes) {
-  const LabelVolume volume = read(bytes);
+  const formats::LabelVolume volume = read(bytes);
   EXPECT_EQ(volume.mask.size, size);
   EXPECT_EQ(volume.voxels, 2U);
   EXPECT_TRUE(volume.mask.inside({1, 2, 1}));
@@ -156,7 +159,7 @@ void expect_sample(const std::string& bytes) {
   for (std::size_t n = 0; n < 12; ++n)
     EXPECT_NEAR(volume.mask.transform.m[n], affine[n], 1e-12) << n;
   EXPECT_TRUE(volume.warnings.empty());
-  const AllLabels all = all_labels_from_bytes(bytes, "test", {}, {});
+  const formats::AllLabels all = formats::all_labels_from_bytes(bytes, "test", {}, {});
   EXPECT_EQ(all.format, volume.format);
   EXPECT_EQ(all.voxels.size, size);
   EXPECT_EQ(all.voxels.transform, volume.mask.transform);
@@ -168,7 +171,7 @@ void expect_sample(const std::string& bytes) {
             << i << " " << j << " " << k;
   for (const Int3& beyond : {Int3{5, 3, 2}, Int3{-1, 0, 0}, Int3{0, 4, 0}, Int3{0, 0, -1}})
     EXPECT_EQ(all.voxels.at(beyond), 0);
-  const GreyScan scan = grey_volume_from_bytes(bytes, "test", {});
+  const formats::GreyScan scan = formats::grey_volume_from_bytes(bytes, "test", {});
   EXPECT_EQ(scan.format, volume.format);
   EXPECT_EQ(scan.volume.transform, volume.mask.transform);
   EXPECT_EQ(scan.volume.values, voxels<float>());
@@ -218,7 +221,7 @@ std::string inr(const std::string& fields, const std::string& data) {
 
 TEST(LabelVolume, InrHasVoxelSizesAlone) {
   const std::string u8 = "TYPE=unsigned fixed\nPIXSIZE=8 bits\nCPU=decm\n";
-  const LabelVolume volume = read(inr(u8, raw(voxels<std::uint8_t>())));
+  const formats::LabelVolume volume = read(inr(u8, raw(voxels<std::uint8_t>())));
   EXPECT_EQ(volume.format, "INR");
   EXPECT_EQ(volume.warnings.size(), 1U);
   EXPECT_EQ(volume.mask.transform.m, (std::array<double, 12>{1, 0, 0, 0, 0, 2, 0, 0, 0, 0, 4, 0}));
@@ -228,7 +231,7 @@ TEST(LabelVolume, InrHasVoxelSizesAlone) {
        {std::pair("decm", false), std::pair("alpha", false), std::pair("pc", false),
         std::pair("sun", true), std::pair("sgi", true)}) {
     const std::string cpu = std::string("CPU=") + name + "\n";
-    EXPECT_EQ(grey_volume_from_bytes(
+    EXPECT_EQ(formats::grey_volume_from_bytes(
                   inr("TYPE=float\nPIXSIZE=32 bits\n" + cpu, raw(voxels<float>(), big)), "test", {})
                   .volume.values,
               voxels<float>());
@@ -237,7 +240,7 @@ TEST(LabelVolume, InrHasVoxelSizesAlone) {
                   .voxels,
               2U);
   }
-  const LabelVolume moved = read(inr("TX=7\nTZ=-2.5\n" + u8, raw(voxels<std::uint8_t>())));
+  const formats::LabelVolume moved = read(inr("TX=7\nTZ=-2.5\n" + u8, raw(voxels<std::uint8_t>())));
   EXPECT_EQ(moved.mask.transform.m[3], 7);
   EXPECT_EQ(moved.mask.transform.m[11], -2.5);
   for (const auto& [fields, says] :
@@ -262,7 +265,7 @@ TEST(LabelVolume, GreyValuesNeedNotBeWhole) {
   values[8] = NAN;
   const std::string bytes =
       nifti_1({.datatype = 16, .bitpix = 32, .slope = 2, .intercept = -1024}, raw(values));
-  const GreyVolume scan = grey_volume_from_bytes(bytes, "test", {}).volume;
+  const labels::GreyVolume scan = formats::grey_volume_from_bytes(bytes, "test", {}).volume;
   EXPECT_EQ(scan.size, size);
   EXPECT_EQ(scan.values.at(0), -624);
   EXPECT_EQ(scan.values.at(7), -1023.5F);
@@ -270,8 +273,8 @@ TEST(LabelVolume, GreyValuesNeedNotBeWhole) {
   EXPECT_EQ(scan.values.at(scan.row(2, 1) + 1), -1006);
   Context little;
   little.max_memory = 300;
-  EXPECT_THROW((void)grey_volume_from_bytes(bytes, "test", little), Error);
-  EXPECT_THROW((void)grey_volume_from_bytes(bytes.substr(0, 500), "test", {}), Error);
+  EXPECT_THROW((void)formats::grey_volume_from_bytes(bytes, "test", little), Error);
+  EXPECT_THROW((void)formats::grey_volume_from_bytes(bytes.substr(0, 500), "test", {}), Error);
 }
 
 TEST(LabelVolume, ScaledLabelsAreThoseThatAreMeant) {
@@ -291,13 +294,13 @@ TEST(LabelVolume, JoinedGzipMembersAreOne) {
 TEST(LabelVolume, QformIsTheQuaternion) {
   // A quarter turn about z, mirrored along k: what `affine` is.
   const float half = std::sqrt(0.5F);
-  const LabelVolume volume = read(nifti_1(
+  const formats::LabelVolume volume = read(nifti_1(
       {.qform = 1, .sform = 0, .quaternion = {0, 0, half}, .qfac = -1}, raw(voxels<char>())));
   for (std::size_t n = 0; n < 12; ++n)
     EXPECT_NEAR(volume.mask.transform.m[n], affine[n], 1e-6) << n;
   // sform goes before qform, and without both the place is guessed.
   expect_sample(nifti_1({.qform = 1, .quaternion = {1, 0, 0}}, raw(voxels<std::uint8_t>())));
-  const LabelVolume guessed = read(nifti_1({.sform = 0}, raw(voxels<std::uint8_t>())));
+  const formats::LabelVolume guessed = read(nifti_1({.sform = 0}, raw(voxels<std::uint8_t>())));
   EXPECT_EQ(guessed.warnings.size(), 1U);
   EXPECT_EQ(guessed.mask.transform.m,
             (std::array<double, 12>{-1, 0, 0, 2, 0, 2, 0, -3, 0, 0, 4, -4}));
@@ -307,7 +310,7 @@ TEST(LabelVolume, QformIsTheQuaternion) {
 }
 
 TEST(LabelVolume, UnitsBecomeMillimetres) {
-  const LabelVolume metres = read(nifti_1({.unit = 1}, raw(voxels<std::uint8_t>())));
+  const formats::LabelVolume metres = read(nifti_1({.unit = 1}, raw(voxels<std::uint8_t>())));
   EXPECT_EQ(metres.mask.transform.m[3], 10000);
   EXPECT_EQ(metres.mask.transform.m[4], 1000);
   EXPECT_NE(message(nifti_1({.unit = 5}, raw(voxels<std::uint8_t>()))), "");
@@ -322,7 +325,7 @@ TEST(LabelVolume, SpacesOfNrrd) {
                      "space origin: (-10,20,30)\n" +
                          data,
                      bytes));
-  const LabelVolume unknown = read(nrrd("space dimension: 3\n" + ras + data, bytes));
+  const formats::LabelVolume unknown = read(nrrd("space dimension: 3\n" + ras + data, bytes));
   EXPECT_EQ(unknown.warnings.size(), 1U);
   EXPECT_EQ(unknown.mask.transform.m[3], 10);
   EXPECT_NE(message(nrrd("space: 3D-left-handed\n" + ras + data, bytes)), "");
@@ -392,8 +395,9 @@ TEST(LabelVolume, AllLabelsAreNumbersOf31Bits) {
   const auto complaint = [](double value) {
     std::vector<double> values = voxels<double>();
     values[7] = value;
-    return test::complaint(
-        [&] { return all_labels_from_bytes(nifti_2(raw(values), false), "test", {}, {}); });
+    return test::complaint([&] {
+      return formats::all_labels_from_bytes(nifti_2(raw(values), false), "test", {}, {});
+    });
   };
   EXPECT_EQ(complaint(0x1p31 - 1), "");
   EXPECT_EQ(complaint(0x1p31), "test: has label 2147483648, expected 0 to 2147483647");
@@ -405,13 +409,14 @@ TEST(LabelVolume, LabelsThatAreNotWantedAreNone) {
   std::vector<double> values = voxels<double>();
   values[7] = -3;
   const std::string bytes = nifti_2(raw(values), false);
-  const LabelRuns some = all_labels_from_bytes(bytes, "test", {{100, 300}}, {}).voxels;
+  const labels::LabelRuns some =
+      formats::all_labels_from_bytes(bytes, "test", {{100, 300}}, {}).voxels;
   EXPECT_EQ(some.at({0, 0, 0}), 200);
   EXPECT_EQ(some.at({1, 2, 1}), 0);
   EXPECT_EQ(some.at({2, 1, 0}), 0);
   EXPECT_EQ(some.runs.size(), 13U); // a row each, and what is behind the voxel of 200
-  EXPECT_THROW((void)all_labels_from_bytes(bytes, "test", {{1, 8}}, {}), Error);
-  EXPECT_THROW((void)all_labels_from_bytes(bytes, "test", {{-3, -3}}, {}), Error);
+  EXPECT_THROW((void)formats::all_labels_from_bytes(bytes, "test", {{1, 8}}, {}), Error);
+  EXPECT_THROW((void)formats::all_labels_from_bytes(bytes, "test", {{-3, -3}}, {}), Error);
 }
 
 TEST(LabelVolume, RunsOfAllLabelsKeepToTheMemory) {
@@ -423,9 +428,10 @@ TEST(LabelVolume, RunsOfAllLabelsKeepToTheMemory) {
                       lps + "\n" + raw(values);
   Context context;
   context.max_memory = 10000000;
-  EXPECT_THROW((void)all_labels_from_bytes(bytes, "test", {}, context), Error);
+  EXPECT_THROW((void)formats::all_labels_from_bytes(bytes, "test", {}, context), Error);
   context.max_memory = 30000000;
-  EXPECT_EQ(all_labels_from_bytes(bytes, "test", {}, context).voxels.runs.size(), values.size());
+  EXPECT_EQ(formats::all_labels_from_bytes(bytes, "test", {}, context).voxels.runs.size(),
+            values.size());
 }
 
 TEST(LabelVolume, ValuesThatAreNoLabelsAreRefused) {
@@ -444,7 +450,7 @@ TEST(LabelVolume, HugeClaimsTakeNoMemory) {
   h.put<std::int16_t>(40, {3, 30000, 30000, 30000});
   Context context;
   context.max_memory = std::uint64_t{1} << 30U;
-  EXPECT_THROW((void)label_volume_from_bytes(h.bytes, "test", {{9, 9}}, context), Error);
+  EXPECT_THROW((void)formats::label_volume_from_bytes(h.bytes, "test", {{9, 9}}, context), Error);
   EXPECT_THROW((void)read(h.bytes), Error); // the bytes end first
 }
 
@@ -453,7 +459,7 @@ TEST(LabelVolume, WhatItsSizeRulesOutIsRefusedBeforeAVoxelIsUnpacked) {
   h.bytes = nifti_of_bytes().substr(0, 352);
   h.put<std::int16_t>(40, {3, 1600, 1600, 1600});
   std::size_t asked = 0;
-  const LabelCheck check = [&](const LabelMask& mask) {
+  const formats::LabelCheck check = [&](const labels::LabelMask& mask) {
     ++asked;
     EXPECT_EQ(mask.size, (Int3{1600, 1600, 1600}));
     EXPECT_TRUE(mask.bits.empty());
@@ -461,7 +467,7 @@ TEST(LabelVolume, WhatItsSizeRulesOutIsRefusedBeforeAVoxelIsUnpacked) {
   };
   for (const std::string& bytes : {h.bytes, gzipped(h.bytes)}) // no voxel follows
     try {
-      (void)label_volume_from_bytes(bytes, "test", {{9, 9}}, {}, check);
+      (void)formats::label_volume_from_bytes(bytes, "test", {{9, 9}}, {}, check);
       ADD_FAILURE() << "not refused";
     } catch (const Error& error) {
       EXPECT_STREQ(error.what(), "too large");
@@ -471,14 +477,14 @@ TEST(LabelVolume, WhatItsSizeRulesOutIsRefusedBeforeAVoxelIsUnpacked) {
 }
 
 TEST(LabelVolume, FirstBytesTellOne) {
-  EXPECT_TRUE(is_label_volume(nifti_of_bytes()));
-  EXPECT_TRUE(is_label_volume(gzipped(nifti_of_bytes()).substr(0, 80)) ||
+  EXPECT_TRUE(formats::is_label_volume(nifti_of_bytes()));
+  EXPECT_TRUE(formats::is_label_volume(gzipped(nifti_of_bytes()).substr(0, 80)) ||
               gzipped(nifti_of_bytes()).size() < 100);
-  EXPECT_TRUE(is_label_volume(gzipped(nifti_of_bytes())));
-  EXPECT_TRUE(is_label_volume(meta("", "")));
-  EXPECT_FALSE(is_label_volume("ply\nformat ascii 1.0\n"));
-  EXPECT_FALSE(is_label_volume("0 0 0 1\n"));
-  EXPECT_FALSE(is_label_volume(""));
+  EXPECT_TRUE(formats::is_label_volume(gzipped(nifti_of_bytes())));
+  EXPECT_TRUE(formats::is_label_volume(meta("", "")));
+  EXPECT_FALSE(formats::is_label_volume("ply\nformat ascii 1.0\n"));
+  EXPECT_FALSE(formats::is_label_volume("0 0 0 1\n"));
+  EXPECT_FALSE(formats::is_label_volume(""));
 }
 
 TEST(LabelVolume, FilesOfTwoParts) {
@@ -489,9 +495,9 @@ TEST(LabelVolume, FilesOfTwoParts) {
         lps + "type: uchar\nencoding: raw\ndata file: " + name + "\n", "");
     std::ofstream(data.path()) << raw(voxels<std::uint8_t>());
   }
-  Input input(header.path());
-  EXPECT_EQ(read_label_volume(input, {{9, 9}}, {}).voxels, 2U);
+  formats::Input input(header.path());
+  EXPECT_EQ(formats::read_label_volume(input, {{9, 9}}, {}).voxels, 2U);
   std::ofstream(data.path()) << "short";
-  Input again(header.path());
-  EXPECT_THROW((void)read_label_volume(again, {{9, 9}}, {}), Error);
+  formats::Input again(header.path());
+  EXPECT_THROW((void)formats::read_label_volume(again, {{9, 9}}, {}), Error);
 }

@@ -18,17 +18,18 @@
 #include <span>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::test {
 namespace {
 
 /// A ball of springs, and nodes of it that can move.
 struct Organ {
-  Model model = test::organ(2);
+  model::Model model = test::organ(2);
   std::vector<std::uint32_t> nodes = test::free_nodes(model);
 };
 
-Load pulled(const std::vector<std::uint32_t>& nodes, std::size_t count, const Vec3& gravity = {}) {
-  Load load;
+contact::Load pulled(const std::vector<std::uint32_t>& nodes, std::size_t count,
+                     const Vec3& gravity = {}) {
+  contact::Load load;
   load.gravity = gravity;
   for (std::size_t k = 0; k < count; ++k)
     load.force[nodes[3 * k]] = {1.0 + static_cast<double>(k), -2, 0.5};
@@ -39,14 +40,14 @@ Load pulled(const std::vector<std::uint32_t>& nodes, std::size_t count, const Ve
 /// sum is recomputed.
 TEST(LoadAnswer, IsRecomputedAfterAThousandIncrements) {
   const Organ organ;
-  Compliance compliance(organ.model, nullptr, test::one_thread(), false);
-  LoadAnswer answer(organ.model, compliance);
+  compliance::Compliance compliance(organ.model, nullptr, test::one_thread(), false);
+  compliance::LoadAnswer answer(organ.model, compliance);
   std::mt19937 random(1);
   std::uniform_real_distribution<double> any(-1, 1);
-  Load load = pulled(organ.nodes, 5);
+  contact::Load load = pulled(organ.nodes, 5);
   (void)answer.whole(load);
   const auto as_fresh = [&] {
-    return answer.whole(load) == LoadAnswer(organ.model, compliance).whole(load);
+    return answer.whole(load) == compliance::LoadAnswer(organ.model, compliance).whole(load);
   };
   for (int change = 1; change <= 1000; ++change) {
     load.force[organ.nodes[0]] = {change == 1 ? 1e9 : any(random), any(random), any(random)};
@@ -60,11 +61,12 @@ TEST(LoadAnswer, IsRecomputedAfterAThousandIncrements) {
 /// at_blocks() caches the answer to the load that the factor carries along.
 TEST(LoadAnswer, CarriedLoadIsThatOfTheLastCall) {
   const Organ organ;
-  CutStiffness stiffness(std::make_shared<const Model>(organ.model), nullptr, test::one_thread());
+  update::CutStiffness stiffness(std::make_shared<const model::Model>(organ.model), nullptr,
+                                 test::one_thread());
   stiffness.prepare();
-  Compliance compliance(organ.model, stiffness.compliance(), test::one_thread(), false);
+  compliance::Compliance compliance(organ.model, stiffness.compliance(), test::one_thread(), false);
   ASSERT_TRUE(compliance.carries());
-  LoadAnswer used(organ.model, compliance);
+  compliance::LoadAnswer used(organ.model, compliance);
   const std::vector<std::uint32_t> nodes{organ.nodes[1], organ.nodes[7]};
   compliance.need_blocks(nodes);
   std::vector<std::size_t> rows;
@@ -73,11 +75,11 @@ TEST(LoadAnswer, CarriedLoadIsThatOfTheLastCall) {
       rows.push_back(3 * std::size_t{node} + axis);
   for (const std::size_t forces : {std::size_t{0}, std::size_t{2}, organ.nodes.size() / 3})
     for (const Vec3& gravity : {Vec3{0, 0, -10}, {7, 0, 0}, {}, {0, 3, 0}}) {
-      const Load load = pulled(organ.nodes, forces, gravity);
+      const contact::Load load = pulled(organ.nodes, forces, gravity);
       const std::vector<double> found = used.at_blocks(load, rows);
-      EXPECT_EQ(found, LoadAnswer(organ.model, compliance).at_blocks(load, rows));
+      EXPECT_EQ(found, compliance::LoadAnswer(organ.model, compliance).at_blocks(load, rows));
       std::vector<double> expected;
-      const std::vector<double> whole = LoadAnswer(organ.model, compliance).whole(load);
+      const std::vector<double> whole = compliance::LoadAnswer(organ.model, compliance).whole(load);
       double most = 0;
       for (const double u : whole)
         most = test::larger(most, std::abs(u));
@@ -89,7 +91,7 @@ TEST(LoadAnswer, CarriedLoadIsThatOfTheLastCall) {
 /// Solves for unit vectors, and counts them.
 struct Units {
   std::size_t nodes = 0, solved = 0;
-  ColumnSolve solve() {
+  columns::ColumnSolve solve() {
     return [this](std::span<const std::uint32_t> of, std::span<double> columns) {
       solved += of.size();
       std::ranges::fill(columns, 0.0);
@@ -102,7 +104,8 @@ struct Units {
 
 TEST(ColumnCache, EvictsTheLeastRecentlyUsedColumn) {
   Units units{6};
-  ColumnCache cache(6, nullptr, units.solve(), 3 * 24.0 * 18, false); // three nodes' columns
+  columns::ColumnCache cache(6, nullptr, units.solve(), 3 * 24.0 * 18,
+                             false); // three nodes' columns
   ASSERT_EQ(cache.capacity(), 3U);
   const auto need = [&](std::vector<std::uint32_t> nodes) { cache.need(nodes); };
   need({0});
@@ -118,7 +121,7 @@ TEST(ColumnCache, EvictsTheLeastRecentlyUsedColumn) {
 /// A call may not evict columns that it needs itself, even the oldest ones.
 TEST(ColumnCache, NeededColumnsAreNotEvicted) {
   Units units{6};
-  ColumnCache cache(6, nullptr, units.solve(), 3 * 24.0 * 18, false);
+  columns::ColumnCache cache(6, nullptr, units.solve(), 3 * 24.0 * 18, false);
   for (const std::uint32_t node : {0U, 1U, 2U})
     cache.need(std::span(&node, 1));
   const std::vector<std::uint32_t> wanted{0, 4, 5};
@@ -131,4 +134,4 @@ TEST(ColumnCache, NeededColumnsAreNotEvicted) {
 }
 
 } // namespace
-} // namespace gewebe
+} // namespace gewebe::test

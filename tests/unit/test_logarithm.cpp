@@ -9,14 +9,15 @@
 #include <limits>
 #include <random>
 
-namespace gewebe {
+namespace gewebe::test {
 namespace {
 
 double ulps(double x) {
   const long double exact = std::log(static_cast<long double>(x));
   const double rounded = static_cast<double>(exact);
   const double ulp = std::nextafter(std::abs(rounded), HUGE_VAL) - std::abs(rounded);
-  return static_cast<double>(std::abs(static_cast<long double>(natural_logarithm(x)) - exact)) /
+  return static_cast<double>(
+             std::abs(static_cast<long double>(numeric::natural_logarithm(x)) - exact)) /
          ulp;
 }
 
@@ -41,12 +42,12 @@ TEST(Logarithm, WithinAnUlpOfTheExactOne) {
 
 TEST(Logarithm, EndsOfTheRange) {
   const double inf = std::numeric_limits<double>::infinity();
-  EXPECT_EQ(natural_logarithm(1), 0);
-  EXPECT_EQ(natural_logarithm(0), -inf);
-  EXPECT_EQ(natural_logarithm(inf), inf);
-  EXPECT_TRUE(std::isnan(natural_logarithm(-1)));
-  EXPECT_TRUE(std::isnan(natural_logarithm(std::nan(""))));
+  EXPECT_EQ(numeric::natural_logarithm(1), 0);
+  EXPECT_EQ(numeric::natural_logarithm(0), -inf);
+  EXPECT_EQ(numeric::natural_logarithm(inf), inf);
+  EXPECT_TRUE(std::isnan(numeric::natural_logarithm(-1)));
+  EXPECT_TRUE(std::isnan(numeric::natural_logarithm(std::nan(""))));
 }
 
 } // namespace
-} // namespace gewebe
+} // namespace gewebe::test

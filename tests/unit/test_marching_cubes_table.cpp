@@ -12,24 +12,24 @@
 #include <set>
 #include <utility>
 
-namespace gewebe {
+namespace gewebe::test {
 namespace {
 
 using Segment = std::pair<int, int>; // from edge to edge
 
 bool crossed(int inside, int e) {
-  const CellEdge edge = cell_edges[static_cast<std::size_t>(e)];
+  const surface::CellEdge edge = surface::cell_edges[static_cast<std::size_t>(e)];
   return ((inside >> edge.corner ^ inside >> (edge.corner | 1 << edge.axis)) & 1) != 0;
 }
 
 /// Does edge e lie in the face of `axis` at `side`?
 bool in_face(int e, int axis, int side) {
-  const CellEdge edge = cell_edges[static_cast<std::size_t>(e)];
+  const surface::CellEdge edge = surface::cell_edges[static_cast<std::size_t>(e)];
   return edge.axis != axis && (edge.corner >> axis & 1) == side;
 }
 
 /// The directed sides of a case's triangles whose reverse is not a side too.
-std::set<Segment> border(const CellCase& cell) {
+std::set<Segment> border(const surface::CellCase& cell) {
   std::set<Segment> sides;
   for (std::size_t t = 0; t < cell.count; ++t)
     for (std::size_t n = 0; n < 3; ++n)
@@ -43,9 +43,9 @@ std::set<Segment> border(const CellCase& cell) {
 
 /// The border segments in a face, as pairs of edges of that face named by (axis, corner without the
 /// face's own bit), so that the two cells at a face name them alike.
-std::set<std::pair<Int3, Int3>> face_segments(const CellCase& cell, int axis, int side) {
+std::set<std::pair<Int3, Int3>> face_segments(const surface::CellCase& cell, int axis, int side) {
   const auto name = [&](int e) {
-    const CellEdge edge = cell_edges[static_cast<std::size_t>(e)];
+    const surface::CellEdge edge = surface::cell_edges[static_cast<std::size_t>(e)];
     return Int3{edge.axis, edge.corner & ~(1 << axis), 0};
   };
   std::set<std::pair<Int3, Int3>> result;
@@ -59,13 +59,13 @@ Vec3 corner_position(int c) {
   return {static_cast<double>(c & 1), static_cast<double>(c >> 1 & 1), static_cast<double>(c >> 2)};
 }
 Vec3 middle(int e) {
-  const CellEdge edge = cell_edges[static_cast<std::size_t>(e)];
+  const surface::CellEdge edge = surface::cell_edges[static_cast<std::size_t>(e)];
   return (corner_position(edge.corner) + corner_position(edge.corner | 1 << edge.axis)) / 2;
 }
 
 TEST(MarchingCubesTable, EdgesStartAtTheLowerCorner) {
   std::set<std::pair<int, int>> ends;
-  for (const CellEdge& edge : cell_edges) {
+  for (const surface::CellEdge& edge : surface::cell_edges) {
     EXPECT_EQ(edge.corner >> edge.axis & 1, 0);
     ends.insert({edge.corner, edge.axis});
   }
@@ -74,8 +74,9 @@ TEST(MarchingCubesTable, EdgesStartAtTheLowerCorner) {
 
 TEST(MarchingCubesTable, UsesExactlyTheCrossedEdges) {
   for (int inside = 0; inside < 256; ++inside) {
-    const CellCase& cell = marching_cubes_table()[static_cast<std::size_t>(inside)];
-    ASSERT_LE(cell.count, max_cell_triangles);
+    const surface::CellCase& cell =
+        surface::marching_cubes_table()[static_cast<std::size_t>(inside)];
+    ASSERT_LE(cell.count, surface::max_cell_triangles);
     std::set<int> used;
     for (std::size_t t = 0; t < cell.count; ++t)
       used.insert(cell.triangles[t].begin(), cell.triangles[t].end());
@@ -88,7 +89,8 @@ TEST(MarchingCubesTable, UsesExactlyTheCrossedEdges) {
 
 TEST(MarchingCubesTable, BorderIsClosedLoopsInTheFaces) {
   for (int inside = 0; inside < 256; ++inside) {
-    const CellCase& cell = marching_cubes_table()[static_cast<std::size_t>(inside)];
+    const surface::CellCase& cell =
+        surface::marching_cubes_table()[static_cast<std::size_t>(inside)];
     std::map<int, int> out, in;
     for (const auto& [a, b] : border(cell)) {
       ++out[a];
@@ -108,7 +110,8 @@ TEST(MarchingCubesTable, BorderIsClosedLoopsInTheFaces) {
 
 TEST(MarchingCubesTable, NoDiagonalLiesInAFace) {
   for (int inside = 0; inside < 256; ++inside) {
-    const CellCase& cell = marching_cubes_table()[static_cast<std::size_t>(inside)];
+    const surface::CellCase& cell =
+        surface::marching_cubes_table()[static_cast<std::size_t>(inside)];
     const std::set<Segment> open = border(cell);
     for (std::size_t t = 0; t < cell.count; ++t)
       for (std::size_t n = 0; n < 3; ++n) {
@@ -123,7 +126,7 @@ TEST(MarchingCubesTable, NoDiagonalLiesInAFace) {
 }
 
 /// Neighbouring cells agree on their common face for all pairs of cases. Returns the disagreements.
-int disagreements(const std::array<CellCase, 256>& table) {
+int disagreements(const std::array<surface::CellCase, 256>& table) {
   int count = 0;
   for (int axis = 0; axis < 3; ++axis)
     for (int a = 0; a < 256; ++a)
@@ -143,12 +146,12 @@ int disagreements(const std::array<CellCase, 256>& table) {
 }
 
 TEST(MarchingCubesTable, NeighboursAgreeForAllPairs) {
-  EXPECT_EQ(disagreements(marching_cubes_table()), 0);
+  EXPECT_EQ(disagreements(surface::marching_cubes_table()), 0);
 }
 
 TEST(MarchingCubesTable, NeighboursOfATableByComplementDisagree) {
   // The table of 1987 takes a case with more than four inside corners from its complement.
-  std::array<CellCase, 256> table = marching_cubes_table();
+  std::array<surface::CellCase, 256> table = surface::marching_cubes_table();
   for (unsigned inside = 0; inside < 256; ++inside)
     if (std::popcount(inside) > 4) {
       table[inside] = table[255 - inside];
@@ -160,7 +163,8 @@ TEST(MarchingCubesTable, NeighboursOfATableByComplementDisagree) {
 
 TEST(MarchingCubesTable, FacesOutward) {
   for (int inside = 0; inside < 256; ++inside) {
-    const CellCase& cell = marching_cubes_table()[static_cast<std::size_t>(inside)];
+    const surface::CellCase& cell =
+        surface::marching_cubes_table()[static_cast<std::size_t>(inside)];
     for (int axis = 0; axis < 3; ++axis)
       for (int side = 0; side < 2; ++side)
         for (const auto& [a, b] : border(cell)) {
@@ -171,7 +175,7 @@ TEST(MarchingCubesTable, FacesOutward) {
           normal[axis] = side == 1 ? 1 : -1;
           const Vec3 outward = cross(normal, middle(b) - middle(a));
           for (const int e : {a, b}) {
-            const CellEdge edge = cell_edges[static_cast<std::size_t>(e)];
+            const surface::CellEdge edge = surface::cell_edges[static_cast<std::size_t>(e)];
             for (const int c : {int{edge.corner}, edge.corner | 1 << edge.axis}) {
               const double distance = dot(corner_position(c) - middle(e), outward);
               EXPECT_NE(distance, 0);
@@ -187,7 +191,7 @@ TEST(MarchingCubesTable, FacesAwayFromCornersHaveAnArea) {
   // face is linear in each of its three fractions, so a component of one sign at the eight ends of
   // their ranges is nowhere smaller than at these.
   constexpr double margin = 1e-3;
-  for (const CellCase& cell : marching_cubes_table())
+  for (const surface::CellCase& cell : surface::marching_cubes_table())
     for (std::size_t t = 0; t < cell.count; ++t) {
       double best = 0; // over directions
       for (int direction = 1; direction < 27; ++direction) {
@@ -199,7 +203,7 @@ TEST(MarchingCubesTable, FacesAwayFromCornersHaveAnArea) {
         for (unsigned ends = 0; ends < 8; ++ends) {
           std::array<Vec3, 3> p;
           for (std::size_t n = 0; n < 3; ++n) {
-            const CellEdge& edge = cell_edges[cell.triangles[t][n]];
+            const surface::CellEdge& edge = surface::cell_edges[cell.triangles[t][n]];
             p[n] = {1.0 * (edge.corner & 1), 1.0 * (edge.corner >> 1 & 1),
                     1.0 * (edge.corner >> 2)};
             p[n][edge.axis] += (ends >> n & 1) != 0 ? 1 - margin : margin;
@@ -213,4 +217,4 @@ TEST(MarchingCubesTable, FacesAwayFromCornersHaveAnArea) {
 }
 
 } // namespace
-} // namespace gewebe
+} // namespace gewebe::test

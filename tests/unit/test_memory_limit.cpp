@@ -11,7 +11,7 @@
 #include <fstream>
 #include <sys/resource.h>
 
-namespace gewebe {
+namespace gewebe::test {
 namespace {
 
 namespace fs = std::filesystem;
@@ -123,4 +123,4 @@ TEST(MemoryLimit, AnAccountRefusesWhatExceedsTheLimit) {
 }
 
 } // namespace
-} // namespace gewebe
+} // namespace gewebe::test

@@ -8,7 +8,7 @@
 #include <cmath>
 #include <utility>
 
-namespace gewebe {
+namespace gewebe::test {
 namespace {
 
 /// Unit cube from `corner`, faces outward.
@@ -60,7 +60,7 @@ TriangleMesh torus(std::uint32_t n) {
 }
 
 TEST(MeshCheck, CubeIsSound) {
-  const MeshReport report = examine_mesh(cube());
+  const mesh::MeshReport report = mesh::examine_mesh(cube());
   EXPECT_TRUE(report.closed() && report.manifold() && report.oriented() && report.outward());
   EXPECT_EQ(report.points, 8U);
   EXPECT_EQ(report.triangles, 12U);
@@ -77,11 +77,11 @@ TEST(MeshCheck, CubeIsSound) {
 }
 
 TEST(MeshCheck, VolumeFarFromTheOrigin) {
-  EXPECT_NEAR(examine_mesh(cube({1e6, -2e6, 3e6})).volume, 1, 1e-9);
+  EXPECT_NEAR(mesh::examine_mesh(cube({1e6, -2e6, 3e6})).volume, 1, 1e-9);
 }
 
 TEST(MeshCheck, TorusHasEulerNumberZero) {
-  const MeshReport report = examine_mesh(torus(24));
+  const mesh::MeshReport report = mesh::examine_mesh(torus(24));
   EXPECT_TRUE(report.closed() && report.manifold() && report.oriented() && report.outward());
   EXPECT_EQ(report.euler, 0);
 }
@@ -89,7 +89,7 @@ TEST(MeshCheck, TorusHasEulerNumberZero) {
 TEST(MeshCheck, MissingFaceLeavesABoundary) {
   TriangleMesh mesh = cube();
   mesh.triangles.pop_back();
-  const MeshReport report = examine_mesh(mesh);
+  const mesh::MeshReport report = mesh::examine_mesh(mesh);
   EXPECT_FALSE(report.closed());
   EXPECT_TRUE(report.manifold());
   EXPECT_EQ(report.boundary_edges, 3U);
@@ -99,7 +99,7 @@ TEST(MeshCheck, MissingFaceLeavesABoundary) {
 TEST(MeshCheck, TurnedFaceIsMisoriented) {
   TriangleMesh mesh = cube();
   std::swap(mesh.triangles[3][0], mesh.triangles[3][1]);
-  const MeshReport report = examine_mesh(mesh);
+  const mesh::MeshReport report = mesh::examine_mesh(mesh);
   EXPECT_TRUE(report.closed() && report.manifold());
   EXPECT_FALSE(report.oriented());
   EXPECT_EQ(report.misoriented_edges, 3U);
@@ -109,7 +109,7 @@ TEST(MeshCheck, ThirdFaceAtAnEdge) {
   TriangleMesh mesh = cube();
   mesh.points.push_back({2, 2, 2});
   mesh.triangles.push_back({0, 1, 8});
-  const MeshReport report = examine_mesh(mesh);
+  const mesh::MeshReport report = mesh::examine_mesh(mesh);
   EXPECT_FALSE(report.manifold());
   EXPECT_EQ(report.nonmanifold_edges, 1U);
   EXPECT_EQ(report.nonmanifold_points, 0U);
@@ -120,7 +120,7 @@ TEST(MeshCheck, TwoFansAtAPoint) {
   for (Triangle& t : mesh.triangles) // weld (1,1,1)
     for (std::uint32_t& p : t)
       p = p == 8 ? 7 : p;
-  const MeshReport report = examine_mesh(mesh);
+  const mesh::MeshReport report = mesh::examine_mesh(mesh);
   EXPECT_FALSE(report.manifold());
   EXPECT_EQ(report.nonmanifold_points, 1U);
   EXPECT_EQ(report.nonmanifold_edges, 0U);
@@ -132,7 +132,7 @@ TEST(MeshCheck, TwoFansAtAPoint) {
 TEST(MeshCheck, DuplicateFace) {
   TriangleMesh mesh = cube();
   mesh.triangles.push_back({mesh.triangles[4][1], mesh.triangles[4][0], mesh.triangles[4][2]});
-  const MeshReport report = examine_mesh(mesh);
+  const mesh::MeshReport report = mesh::examine_mesh(mesh);
   EXPECT_EQ(report.duplicate_faces, 1U);
   EXPECT_FALSE(report.manifold());
 }
@@ -140,7 +140,7 @@ TEST(MeshCheck, DuplicateFace) {
 TEST(MeshCheck, DegenerateFaceTakesNoPartInAnythingElse) {
   TriangleMesh mesh = cube();
   mesh.triangles.push_back({3, 3, 5});
-  const MeshReport report = examine_mesh(mesh);
+  const mesh::MeshReport report = mesh::examine_mesh(mesh);
   EXPECT_EQ(report.degenerate_faces, 1U);
   EXPECT_FALSE(report.manifold());
   EXPECT_TRUE(report.closed());
@@ -150,15 +150,15 @@ TEST(MeshCheck, DegenerateFaceTakesNoPartInAnythingElse) {
 TEST(MeshCheck, FlatFace) {
   TriangleMesh mesh = cube();
   mesh.points[1] = {0.5, 0, 0}; // 0, 1, 5, 4: moved along an edge, still proper
-  EXPECT_EQ(examine_mesh(mesh).zero_area_faces, 0U);
+  EXPECT_EQ(mesh::examine_mesh(mesh).zero_area_faces, 0U);
   mesh.points[1] = mesh.points[5] * 0.5; // on the line from 0 to 5
-  const MeshReport report = examine_mesh(mesh);
+  const mesh::MeshReport report = mesh::examine_mesh(mesh);
   EXPECT_EQ(report.zero_area_faces, 1U);
   EXPECT_EQ(report.smallest_angle, 0);
 }
 
 TEST(MeshCheck, InvertedCubeFacesInward) {
-  const MeshReport report = examine_mesh(flipped(cube()));
+  const mesh::MeshReport report = mesh::examine_mesh(flipped(cube()));
   EXPECT_TRUE(report.closed() && report.manifold() && report.oriented());
   EXPECT_FALSE(report.outward());
   EXPECT_EQ(report.inverted_components, 1U);
@@ -168,21 +168,21 @@ TEST(MeshCheck, InvertedCubeFacesInward) {
 TEST(MeshCheck, NestedShellsAlternate) {
   const TriangleMesh body = joined(cube({}, 9), flipped(cube({1, 1, 1}, 7)));
   const TriangleMesh kernel = joined(body, cube({3, 3, 3}, 2));
-  const MeshReport report = examine_mesh(kernel);
+  const mesh::MeshReport report = mesh::examine_mesh(kernel);
   EXPECT_TRUE(report.outward());
   EXPECT_EQ(report.components, 3U);
   EXPECT_NEAR(report.volume, 729 - 343 + 8, 1e-9);
   // Inner shells that face the wrong way are found, in any order of the components.
-  EXPECT_EQ(examine_mesh(joined(cube({}, 9), cube({1, 1, 1}, 7))).inverted_components, 1U);
-  EXPECT_EQ(examine_mesh(joined(cube({1, 1, 1}, 7), cube({}, 9))).inverted_components, 1U);
-  EXPECT_EQ(examine_mesh(flipped(kernel)).inverted_components, 3U);
+  EXPECT_EQ(mesh::examine_mesh(joined(cube({}, 9), cube({1, 1, 1}, 7))).inverted_components, 1U);
+  EXPECT_EQ(mesh::examine_mesh(joined(cube({1, 1, 1}, 7), cube({}, 9))).inverted_components, 1U);
+  EXPECT_EQ(mesh::examine_mesh(flipped(kernel)).inverted_components, 3U);
   // Beside, above and below are not inside.
   for (const Vec3& corner : {Vec3{0, 0, 20}, Vec3{0, 0, -20}, Vec3{20, 0, 0}, Vec3{0, -20, 0}})
-    EXPECT_TRUE(examine_mesh(joined(cube({}, 9), cube(corner, 3))).outward());
+    EXPECT_TRUE(mesh::examine_mesh(joined(cube({}, 9), cube(corner, 3))).outward());
 }
 
 TEST(MeshCheck, EmptyMesh) {
-  const MeshReport report = examine_mesh({});
+  const mesh::MeshReport report = mesh::examine_mesh({});
   EXPECT_TRUE(report.closed() && report.manifold() && report.oriented() && report.outward());
   EXPECT_EQ(report.euler, 0);
   EXPECT_EQ(report.edge_min, 0);
@@ -191,10 +191,10 @@ TEST(MeshCheck, EmptyMesh) {
 TEST(MeshCheck, UnusedPoints) {
   TriangleMesh mesh = cube();
   mesh.points.push_back({5, 5, 5});
-  const MeshReport report = examine_mesh(mesh);
+  const mesh::MeshReport report = mesh::examine_mesh(mesh);
   EXPECT_EQ(report.unused_points, 1U);
   EXPECT_EQ(report.euler, 2);
 }
 
 } // namespace
-} // namespace gewebe
+} // namespace gewebe::test

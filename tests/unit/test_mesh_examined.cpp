@@ -19,30 +19,30 @@
 #include <utility>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::test {
 namespace {
 
 /// By sets over all corners: those of a point that edges join are one fan.
-MeshReport counted(const TriangleMesh& mesh) {
-  MeshReport report;
+mesh::MeshReport counted(const TriangleMesh& mesh) {
+  mesh::MeshReport report;
   DisjointSets corners(3 * mesh.triangles.size()), connected(mesh.points.size());
-  EdgeSides(mesh.points.size(), mesh.triangles)
-      .for_each_edge([&](std::uint32_t, std::span<const EdgeSide> edge) {
+  mesh::EdgeSides(mesh.points.size(), mesh.triangles)
+      .for_each_edge([&](std::uint32_t, std::span<const mesh::EdgeSide> edge) {
         ++report.edges;
         report.boundary_edges += edge.size() == 1 ? 1 : 0;
         report.nonmanifold_edges += edge.size() > 2 ? 1 : 0;
-        report.misoriented_edges += edge.size() == 2 && surplus(edge) != 0 ? 1 : 0;
-        for (const EdgeSide& other : edge.subspan(1)) {
+        report.misoriented_edges += edge.size() == 2 && mesh::surplus(edge) != 0 ? 1 : 0;
+        for (const mesh::EdgeSide& other : edge.subspan(1)) {
           corners.join(edge[0].low_corner(), other.low_corner());
           corners.join(edge[0].high_corner(), other.high_corner());
         }
       });
   std::vector<std::set<std::uint32_t>> fans(mesh.points.size());
   const std::vector<bool> repeated =
-      repeated_faces(mesh.points.size(), mesh.triangles, SameFace::corners);
+      mesh::repeated_faces(mesh.points.size(), mesh.triangles, mesh::SameFace::corners);
   for (std::uint32_t f = 0; f < mesh.triangles.size(); ++f) {
     const Triangle& t = mesh.triangles[f];
-    if (has_equal_corners(t)) {
+    if (mesh::has_equal_corners(t)) {
       ++report.degenerate_faces;
       continue;
     }
@@ -61,7 +61,7 @@ MeshReport counted(const TriangleMesh& mesh) {
 }
 
 void expect_counted(const TriangleMesh& mesh, const Context& context = {}) {
-  const MeshReport found = examine_mesh(mesh, context), expected = counted(mesh);
+  const mesh::MeshReport found = mesh::examine_mesh(mesh, context), expected = counted(mesh);
   EXPECT_EQ(found.edges, expected.edges);
   EXPECT_EQ(found.boundary_edges, expected.boundary_edges);
   EXPECT_EQ(found.nonmanifold_edges, expected.nonmanifold_edges);
@@ -146,8 +146,8 @@ TEST(MeshExamined, TwoRingsAtAPoint) {
   mesh.points = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}, {-1, 0, 0}, {0, -1, 0}, {0, 0, -1}};
   mesh.triangles = {{0, 2, 1}, {0, 3, 2}, {0, 1, 3}, {1, 2, 3},
                     {0, 4, 5}, {0, 5, 6}, {0, 6, 4}, {4, 6, 5}};
-  EXPECT_EQ(examine_mesh(mesh).nonmanifold_points, 1U);
-  EXPECT_TRUE(examine_mesh(mesh).closed());
+  EXPECT_EQ(mesh::examine_mesh(mesh).nonmanifold_points, 1U);
+  EXPECT_TRUE(mesh::examine_mesh(mesh).closed());
   expect_counted(mesh);
 }
 
@@ -162,7 +162,7 @@ TEST(MeshExamined, PointsUnderManyFaces) {
       mesh.triangles.push_back({0, a, b});
       mesh.triangles.push_back({1, b, a});
     }
-    const MeshReport report = examine_mesh(mesh);
+    const mesh::MeshReport report = mesh::examine_mesh(mesh);
     EXPECT_TRUE(report.closed() && report.manifold() && report.outward()) << count;
     EXPECT_EQ(report.euler, 2) << count;
     expect_counted(mesh);
@@ -195,9 +195,9 @@ TEST(MeshExamined, LargeOnesOnAnyNumberOfThreads) {
     }
     mesh.triangles.pop_back();
     expect_counted(mesh, on_threads(2));
-    MeshQuality one, two;
-    const MeshReport a = examine_mesh(mesh, on_threads(1), &one),
-                     b = examine_mesh(mesh, on_threads(2), &two);
+    mesh::MeshQuality one, two;
+    const mesh::MeshReport a = mesh::examine_mesh(mesh, on_threads(1), &one),
+                           b = mesh::examine_mesh(mesh, on_threads(2), &two);
     EXPECT_EQ(a.volume, b.volume);
     EXPECT_EQ(a.area, b.area);
     EXPECT_EQ(a.edge_mean, b.edge_mean);
@@ -219,8 +219,8 @@ void expect_shapes(double most) {
   std::uniform_real_distribution<double> shift(-most, most);
   for (Vec3& p : mesh.points)
     p += Vec3{shift(random), shift(random), shift(random)};
-  MeshQuality quality;
-  const MeshReport report = examine_mesh(mesh, {}, &quality);
+  mesh::MeshQuality quality;
+  const mesh::MeshReport report = mesh::examine_mesh(mesh, {}, &quality);
   std::vector<double> angles;
   std::vector<std::uint64_t> counts(12);
   std::vector<double> stiffness(mesh.points.size());
@@ -251,4 +251,4 @@ TEST(MeshExamined, ShapesEqualThoseOfEachFace) {
 }
 
 } // namespace
-} // namespace gewebe
+} // namespace gewebe::test

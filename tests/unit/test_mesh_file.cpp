@@ -52,17 +52,17 @@ std::string get(const std::string& path) {
   return {std::istreambuf_iterator<char>(file), {}};
 }
 
-TriangleMesh read(const std::string& path, MeshReadOptions options = {},
-                  MeshReadStats* stats = nullptr) {
-  Input input(path);
-  if (options.kind == Kind::unknown)
-    options.kind = input_kind(input.peek(4096), path, "");
-  return read_mesh(input, options, stats);
+TriangleMesh read(const std::string& path, formats::MeshReadOptions options = {},
+                  formats::MeshReadStats* stats = nullptr) {
+  formats::Input input(path);
+  if (options.kind == formats::Kind::unknown)
+    options.kind = formats::input_kind(input.peek(4096), path, "");
+  return formats::read_mesh(input, options, stats);
 }
 
 void write(const std::string& path, const TriangleMesh& mesh) {
-  Output output(path, {});
-  write_mesh(output, mesh, kind_from_suffix(path));
+  formats::Output output(path, {});
+  formats::write_mesh(output, mesh, formats::kind_from_suffix(path));
   output.commit();
 }
 
@@ -146,13 +146,13 @@ std::string unit_square_obj(const std::string& more = "") {
 TEST(Child, GivesItsBytes) {
   std::string large(3'000'000, 'x');
   large[1'234'567] = '\0';
-  EXPECT_EQ(run_in_child([&] { return large; }, {}), large);
-  EXPECT_EQ(run_in_child([] { return std::string(); }, {}), "");
+  EXPECT_EQ(formats::run_in_child([&] { return large; }, {}), large);
+  EXPECT_EQ(formats::run_in_child([] { return std::string(); }, {}), "");
 }
 
 TEST(Child, CrashIsAnError) {
   EXPECT_EQ(test::complaint([] {
-              run_in_child(
+              formats::run_in_child(
                   []() -> std::string {
                     std::signal(SIGSEGV, SIG_DFL);
                     std::raise(SIGSEGV);
@@ -161,17 +161,18 @@ TEST(Child, CrashIsAnError) {
                   {});
             }),
             "crashed (signal 11)");
-  EXPECT_EQ(test::complaint([] { run_in_child([]() -> std::string { ::_exit(0); }, {}); }),
+  EXPECT_EQ(test::complaint([] { formats::run_in_child([]() -> std::string { ::_exit(0); }, {}); }),
             "ended without an answer");
-  EXPECT_EQ(test::complaint([] { run_in_child([]() -> std::string { throw Error("no"); }, {}); }),
+  EXPECT_EQ(test::complaint(
+                [] { formats::run_in_child([]() -> std::string { throw Error("no"); }, {}); }),
             "no");
 }
 
 TEST(Child, TimeIsLimited) {
-  ChildLimits limits;
+  formats::ChildLimits limits;
   limits.cpu_seconds = 1;
   EXPECT_EQ(test::complaint([&] {
-              run_in_child(
+              formats::run_in_child(
                   []() -> std::string {
                     for (volatile bool on = true; on;)
                       ;
@@ -183,7 +184,7 @@ TEST(Child, TimeIsLimited) {
   limits.seconds = 0.1;
   const auto start = std::chrono::steady_clock::now();
   EXPECT_NE(test::complaint([&] {
-              run_in_child(
+              formats::run_in_child(
                   []() -> std::string {
                     for (;;)
                       ::pause();
@@ -197,11 +198,11 @@ TEST(Child, TimeIsLimited) {
 TEST(Child, MemoryIsLimited) {
   if (test::under_sanitizers())
     GTEST_SKIP() << "a sanitizer's shadow takes terabytes of address space";
-  ChildLimits limits;
+  formats::ChildLimits limits;
   limits.memory = 64 << 20;
   const auto take = [&](std::size_t size) {
     return test::complaint([&] {
-      run_in_child([&] { return std::to_string(std::string(size, 'x').size()); }, limits);
+      formats::run_in_child([&] { return std::to_string(std::string(size, 'x').size()); }, limits);
     });
   };
   EXPECT_EQ(take(16 << 20), "");
@@ -211,7 +212,7 @@ TEST(Child, MemoryIsLimited) {
 TEST(Child, InheritsNothing) {
   Folder folder;
   const int fd = ::fileno(std::fopen((folder / "open").c_str(), "w"));
-  EXPECT_EQ(run_in_child(
+  EXPECT_EQ(formats::run_in_child(
                 [&] {
                   return std::string(::write(fd == 3 ? 4 : fd, "x", 1) < 0 &&
                                              ::write(1, "x", 1) == 1
@@ -230,31 +231,31 @@ TEST(MeshFile, RoundTripsThroughEveryWritableKind) {
   Folder folder;
   const TriangleMesh mesh = two_boxes();
   ASSERT_EQ(open_edges(mesh), 0u);
-  for (const Kind kind : writable_mesh_kinds()) {
-    SCOPED_TRACE(kind_name(kind));
-    const std::string path = folder / ("m." + std::string(kind_name(kind)));
+  for (const formats::Kind kind : formats::writable_mesh_kinds()) {
+    SCOPED_TRACE(formats::kind_name(kind));
+    const std::string path = folder / ("m." + std::string(formats::kind_name(kind)));
     write(path, mesh);
     const std::string bytes = get(path);
     write(path, mesh);
     EXPECT_EQ(get(path), bytes); // the same from run to run
-    MeshReadStats stats;
+    formats::MeshReadStats stats;
     const TriangleMesh back = read(path, {}, &stats);
     // Kinds in single precision and metres keep 24 bits.
     const auto expected = shape(mesh, true), found = shape(back, true);
     ASSERT_EQ(found.size(), expected.size());
     for (std::size_t t = 0; t < found.size(); ++t)
       for (std::size_t k = 0; k < 3; ++k)
-        EXPECT_LE(norm(found[t][k] - expected[t][k]), kind == Kind::glb ? 2e-6 : 0.0);
+        EXPECT_LE(norm(found[t][k] - expected[t][k]), kind == formats::Kind::glb ? 2e-6 : 0.0);
     EXPECT_NEAR(signed_volume(back), signed_volume(mesh), 1e-5);
     EXPECT_EQ(back.points.size(), 16u);
     EXPECT_EQ(open_edges(back), 0u);
-    EXPECT_EQ(stats.parts, kind == Kind::stl ? 1u : 2u);
+    EXPECT_EQ(stats.parts, kind == formats::Kind::stl ? 1u : 2u);
     EXPECT_EQ(stats.weld.degenerate_removed, 0u);
-    if (kind == Kind::stl)
+    if (kind == formats::Kind::stl)
       continue;
     ASSERT_EQ(back.material.size(), 24u);
     ASSERT_EQ(back.texcoords.size(), 24u);
-    if (kind == Kind::three_ds) // welds texture coordinates of equal position
+    if (kind == formats::Kind::three_ds) // welds texture coordinates of equal position
       continue;
     EXPECT_EQ(back.texcoords[5], mesh.texcoords[5]);
   }
@@ -305,7 +306,7 @@ TEST(MeshFile, LargeMeshSplitsAndRejoinsIn3ds) {
 TEST(MeshFile, Units) {
   Folder folder;
   const std::string obj = put(folder / "m.obj", unit_square_obj());
-  MeshReadOptions options;
+  formats::MeshReadOptions options;
   EXPECT_EQ(bounding_box(read(obj)).max, (Vec3{1, 1, 0}));
   options.unit = "cm";
   EXPECT_EQ(bounding_box(read(obj, options)).max, (Vec3{10, 10, 0}));
@@ -360,7 +361,7 @@ TEST(MeshFile, ObjGroupsOfOneNameAreOnePart) {
   const std::string obj =
       put(folder / "m.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 1 1 0\nv 2 2 0\ng a\nf 1 2 3\n"
                             "g b\nf 2 4 3\ng a\nf 4 5 3\n");
-  MeshReadStats stats;
+  formats::MeshReadStats stats;
   EXPECT_EQ(read(obj, {}, &stats).part, (std::vector<std::int32_t>{0, 1, 0}));
   EXPECT_EQ(stats.parts, 2u);
 }
@@ -380,7 +381,7 @@ TEST(MeshFile, DxfLayersArePartsAndAxesStay) {
   face("ONE", {{1, 2, 3}, {2, 3, 3}, {1, 3, 3}});
   dxf += "  0\nENDSEC\n  0\nEOF\n";
   const std::string path = put(folder / "m.dxf", dxf);
-  MeshReadStats stats;
+  formats::MeshReadStats stats;
   const TriangleMesh mesh = read(path, {}, &stats);
   EXPECT_EQ(mesh.triangles.size(), 4u);
   EXPECT_EQ(stats.parts, 2u);
@@ -404,7 +405,7 @@ TEST(MeshFile, GltfNodesAreMovedAndMirroredOnesTurned) {
       R"("bufferViews":[{"buffer":0,"byteOffset":0,"byteLength":36}],)"
       R"("buffers":[{"byteLength":36,"uri":"data:application/octet-stream;base64,)"
       R"(AAAAAAAAAAAAAAAAAACAPwAAAAAAAAAAAAAAAAAAgD8AAAAA"}]})";
-  MeshReadStats stats;
+  formats::MeshReadStats stats;
   const TriangleMesh mesh = read(put(folder / "m.gltf", gltf), {}, &stats);
   ASSERT_EQ(mesh.triangles.size(), 2u);
   EXPECT_EQ(stats.parts, 2u);
@@ -416,22 +417,22 @@ TEST(MeshFile, GltfNodesAreMovedAndMirroredOnesTurned) {
 }
 
 TEST(MeshFile, WeldWordsAndDefaults) {
-  EXPECT_EQ(weld_from_name("auto"), std::nullopt);
-  EXPECT_EQ(weld_from_name(""), std::nullopt);
-  EXPECT_EQ(weld_from_name("all"), Weld::all);
-  EXPECT_THROW(weld_from_name("some"), UsageError);
+  EXPECT_EQ(formats::weld_from_name("auto"), std::nullopt);
+  EXPECT_EQ(formats::weld_from_name(""), std::nullopt);
+  EXPECT_EQ(formats::weld_from_name("all"), repair::Weld::all);
+  EXPECT_THROW(formats::weld_from_name("some"), UsageError);
   Folder folder;
   TriangleMesh mesh;
   mesh.points = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {1, 0, 0}, {1, 1, 0}, {0, 1, 0}};
   mesh.triangles = {{0, 1, 2}, {3, 4, 5}};
   write(folder / "m.ply", mesh);
   EXPECT_EQ(read(folder / "m.ply").points.size(), 6u); // its indices count
-  MeshReadOptions options;
-  options.weld = Weld::all;
+  formats::MeshReadOptions options;
+  options.weld = repair::Weld::all;
   EXPECT_EQ(read(folder / "m.ply", options).points.size(), 4u);
   write(folder / "m.stl", mesh);
   EXPECT_EQ(read(folder / "m.stl").points.size(), 4u);
-  options.weld = Weld::none;
+  options.weld = repair::Weld::none;
   EXPECT_EQ(read(folder / "m.stl", options).points.size(), 6u);
 }
 
@@ -457,12 +458,12 @@ TEST(MeshFile, EveryPrefixOfSmallFilesEndsInOrder) {
     write(folder / name, mesh);
     const std::string bytes = get(folder / name);
     for (std::size_t size = 1; size < bytes.size(); size += 1 + bytes.size() / 24) {
-      AssimpSource source;
+      formats::AssimpSource source;
       const std::string part = bytes.substr(0, size);
       source.bytes = part;
-      source.kind = kind_from_suffix(name);
+      source.kind = formats::kind_from_suffix(name);
       try {
-        check_mesh(read_by_assimp(source));
+        check_mesh(formats::read_by_assimp(source));
       } catch (const Error&) {
       }
     }
@@ -475,16 +476,16 @@ namespace {
 
 struct Target {
   const char* name;
-  std::optional<Weld> weld;
+  std::optional<repair::Weld> weld;
   std::size_t points, edges, triangles;
   std::uint64_t parts;
 };
 
 void expect_target(const Target& target) {
   SCOPED_TRACE(target.name);
-  MeshReadOptions options;
+  formats::MeshReadOptions options;
   options.weld = target.weld;
-  MeshReadStats stats;
+  formats::MeshReadStats stats;
   const TriangleMesh mesh = read(shared(target.name), options, &stats);
   EXPECT_EQ(mesh.points.size(), target.points);
   EXPECT_EQ(edge_count(mesh), target.edges);
@@ -499,19 +500,20 @@ void expect_target(const Target& target) {
 TEST(MeshData, OrgansWeldAsCounted) {
   if (!fs::exists(shared("")))
     GTEST_SKIP() << "no " << shared("");
-  const std::optional<Weld> automatic;
+  const std::optional<repair::Weld> automatic;
   for (const Target& target : {
            Target{"ts_liver_gallbladder_portal.dxf", automatic, 15696, 47076, 31384, 3},
            Target{"ts_liver_gallbladder_portal.obj", automatic, 15696, 47076, 31384, 3},
-           Target{"ts_liver_gallbladder_portal.dxf", Weld::all, 15651, 46982, 31384, 3},
-           Target{"ts_liver_gallbladder_portal.obj", Weld::all, 15673, 47037, 31384, 3},
+           Target{"ts_liver_gallbladder_portal.dxf", repair::Weld::all, 15651, 46982, 31384, 3},
+           Target{"ts_liver_gallbladder_portal.obj", repair::Weld::all, 15673, 47037, 31384, 3},
            Target{"hubmap_F_spleen_uv.obj", automatic, 4274, 12816, 8544, 5},
            Target{"sofa_liver_smooth.obj", automatic, 2194, 6576, 4384, 1},
            Target{"gca90_large_intestine_20k.stl", automatic, 10000, 30000, 20000, 1},
        })
     expect_target(target);
-  MeshReadOptions options; // the negative control: without joining at borders the spleen stays open
-  options.weld = Weld::part;
+  formats::MeshReadOptions
+      options; // the negative control: without joining at borders the spleen stays open
+  options.weld = repair::Weld::part;
   EXPECT_EQ(read(shared("hubmap_F_spleen_uv.obj"), options).points.size(), 4564u);
 }
 

@@ -18,23 +18,23 @@
 #include <utility>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::test {
 namespace {
 
 using test::organ;
 
 /// The organ of the tests is a ball of radius 20 about this.
 const Vec3 middle{100, -50, 30};
-const Quaternion askew = unit({0.8, 0.3, -0.5, 0.1});
+const contact::Quaternion askew = contact::unit({0.8, 0.3, -0.5, 0.1});
 
-InstrumentShape shape_of(const TriangleMesh& mesh, double radius, double friction = 0) {
-  InstrumentShape shape{radius, {}, friction};
-  shape.core = std::make_shared<const ConvexCore>(mesh);
+contact::InstrumentShape shape_of(const TriangleMesh& mesh, double radius, double friction = 0) {
+  contact::InstrumentShape shape{radius, {}, friction};
+  shape.core = std::make_shared<const contact::ConvexCore>(mesh);
   return shape;
 }
 
 /// A jaw: a box with its middle in the origin.
-InstrumentShape jaw(double radius, double friction) {
+contact::InstrumentShape jaw(double radius, double friction) {
   TriangleMesh box = test::divided_box({9, 4, 2}, 3);
   for (Vec3& p : box.points)
     p -= {4.5, 2, 1};
@@ -45,17 +45,17 @@ struct Felt {
   Vec3 force, torque;
 };
 
-Felt pressed(const InstrumentShape& shape, const Pose& pose, Method method,
-             Integration integration = Integration::semi_implicit) {
-  Simulation s(test::one_thread(), {});
+Felt pressed(const contact::InstrumentShape& shape, const contact::Pose& pose, scene::Method method,
+             scene::Integration integration = scene::Integration::semi_implicit) {
+  scene::Simulation s(test::one_thread(), {});
   s.add_object("o", organ(3), method, {}, integration);
-  s.apply(SetInstrument{0, shape, {pose.place + Vec3{0, 0, 5}, pose.turn}});
+  s.apply(scene::SetInstrument{0, shape, {pose.place + Vec3{0, 0, 5}, pose.turn}});
   for (int k = 4; k >= 0; --k) {
-    s.apply(MoveInstrument{0, pose.place + Vec3{0, 0, 1.0 * k}, {}, 0.05});
+    s.apply(scene::MoveInstrument{0, pose.place + Vec3{0, 0, 1.0 * k}, {}, 0.05});
     s.step(0.05);
   }
   s.step(0.1);
-  const InstrumentReport tool = s.instrument(0);
+  const scene::InstrumentReport tool = s.instrument(0);
   return {tool.force, tool.torque};
 }
 
@@ -64,8 +64,8 @@ TEST(MeshInstrument, ARefinedMeshHasTheForcesOfTheSphereAndTheCapsule) {
   const int turns = 4; // of the mesh: where its corners are is chance
   for (const bool capsule : {false, true}) {
     const Vec3 axis = capsule ? Vec3{9, 3, 1} : Vec3{};
-    const Pose pose{middle + Vec3{0.3, 0.2, 26} - 0.5 * axis, {}};
-    const Felt exact = pressed({whole, axis, 0.2}, pose, Method::ffe);
+    const contact::Pose pose{middle + Vec3{0.3, 0.2, 26} - 0.5 * axis, {}};
+    const Felt exact = pressed({whole, axis, 0.2}, pose, scene::Method::ffe);
     std::vector<double> push, all; // what is missing of the push, and of the force
     for (const unsigned k : {1U, 2U, 3U}) {
       push.push_back(0);
@@ -73,17 +73,19 @@ TEST(MeshInstrument, ARefinedMeshHasTheForcesOfTheSphereAndTheCapsule) {
       for (int n = 0; n < turns; ++n) {
         TriangleMesh mesh;
         if (capsule) {
-          InstrumentSurface round = round_surface(whole - radius, axis, std::size_t{4} << k);
+          contact::InstrumentSurface round =
+              contact::round_surface(whole - radius, axis, std::size_t{4} << k);
           mesh.points = std::move(round.points);
           mesh.triangles = std::move(round.triangles);
         } else {
           mesh = test::sphere_mesh(static_cast<int>(k), whole - radius, {});
         }
-        const Quaternion turn =
-            capsule ? turn_about(axis, 13.7 * n) : unit({0.8, 0.3 + 0.31 * n, 0.7 * n - 0.5, 0.1});
+        const contact::Quaternion turn =
+            capsule ? contact::turn_about(axis, 13.7 * n)
+                    : contact::unit({0.8, 0.3 + 0.31 * n, 0.7 * n - 0.5, 0.1});
         for (Vec3& p : mesh.points)
-          p = rotated(turn, p);
-        const Felt found = pressed(shape_of(mesh, radius, 0.2), pose, Method::ffe);
+          p = contact::rotated(turn, p);
+        const Felt found = pressed(shape_of(mesh, radius, 0.2), pose, scene::Method::ffe);
         push.back() += (exact.force.z - found.force.z) / exact.force.z / turns;
         all.back() += norm(exact.force - found.force) / norm(exact.force) / turns;
       }
@@ -102,25 +104,26 @@ TEST(MeshInstrument, ARefinedMeshHasTheForcesOfTheSphereAndTheCapsule) {
 }
 
 TEST(MeshInstrument, ItIsKeptOutAndWhatItFeelsIsWhatItDoes) {
-  for (const auto& [method, integration] : {std::pair(Method::ffe, Integration::semi_implicit),
-                                            std::pair(Method::ela, Integration::semi_implicit),
-                                            std::pair(Method::ela, Integration::implicit)})
+  for (const auto& [method, integration] :
+       {std::pair(scene::Method::ffe, scene::Integration::semi_implicit),
+        std::pair(scene::Method::ela, scene::Integration::semi_implicit),
+        std::pair(scene::Method::ela, scene::Integration::implicit)})
     for (const double friction : {0.0, 0.4}) {
-      Simulation s(test::one_thread(), {});
+      scene::Simulation s(test::one_thread(), {});
       s.add_object("o", organ(3), method, {}, integration);
-      const InstrumentShape shape = jaw(0.5, friction);
+      const contact::InstrumentShape shape = jaw(0.5, friction);
       const Vec3 start = middle + Vec3{0.3, 0.2, 26};
-      s.apply(SetInstrument{0, shape, {start, askew}});
+      s.apply(scene::SetInstrument{0, shape, {start, askew}});
       bool touched = false;
-      const auto step = [&](const Vec3& to, const Quaternion& turn) {
-        s.apply(MoveInstrument{0, to, turn, 0.02});
+      const auto step = [&](const Vec3& to, const contact::Quaternion& turn) {
+        s.apply(scene::MoveInstrument{0, to, turn, 0.02});
         s.step(0.02);
-        const InstrumentReport tool = s.instrument(0);
+        const scene::InstrumentReport tool = s.instrument(0);
         EXPECT_LT(test::surface_depth(s.model(0), s.displacement(0), shape, tool.pose),
                   test::depth_allowed);
         Vec3 sum;
         double size = 0;
-        for (const NodeVector& f : s.contact_forces(0)) {
+        for (const contact::NodeVector& f : s.contact_forces(0)) {
           sum += f.value;
           size += norm(f.value);
         }
@@ -131,9 +134,9 @@ TEST(MeshInstrument, ItIsKeptOutAndWhatItFeelsIsWhatItDoes) {
       for (int k = 1; k <= 6; ++k)
         step(start - Vec3{0, 0, 0.7 * k}, askew);
       for (int k = 1; k <= 4; ++k)
-        step(start + Vec3{0.4 * k, 0, -4.2}, unit({0.8, 0.3 + 0.05 * k, -0.5, 0.1}));
+        step(start + Vec3{0.4 * k, 0, -4.2}, contact::unit({0.8, 0.3 + 0.05 * k, -0.5, 0.1}));
       EXPECT_TRUE(touched);
-      s.apply(MoveInstrument{0, start + Vec3{0, 0, 30}, {}, 0.02});
+      s.apply(scene::MoveInstrument{0, start + Vec3{0, 0, 30}, {}, 0.02});
       s.step(0.02);
       s.step(0.02);
       EXPECT_EQ(s.instrument(0).force, Vec3{});
@@ -141,7 +144,7 @@ TEST(MeshInstrument, ItIsKeptOutAndWhatItFeelsIsWhatItDoes) {
 }
 
 TEST(MeshInstrument, SlidAlongItsForceIsContinuous) {
-  const Model model = organ(3);
+  const model::Model model = organ(3);
   double edges = 0;
   for (const Triangle& t : model.triangles)
     for (std::size_t k = 0; k < 3; ++k)
@@ -151,14 +154,14 @@ TEST(MeshInstrument, SlidAlongItsForceIsContinuous) {
   for (const auto& way : {std::array{0.5 * edge, 0.04, 0.0}, std::array{0.5 * edge, 0.04, 0.3},
                           std::array{0.1, 0.02, 0.0}}) {
     const double radius = way[0], along = way[1], friction = way[2];
-    const InstrumentShape shape = jaw(radius, friction);
-    Simulation s(test::one_thread(), {});
-    s.add_object("o", model, Method::ffe);
-    s.apply(SetInstrument{0, shape, {middle + Vec3{-1.5, 0.3, 30}, askew}});
+    const contact::InstrumentShape shape = jaw(radius, friction);
+    scene::Simulation s(test::one_thread(), {});
+    s.add_object("o", model, scene::Method::ffe);
+    s.apply(scene::SetInstrument{0, shape, {middle + Vec3{-1.5, 0.3, 30}, askew}});
     s.step(0.01);
     double before = HUGE_VAL, jump = 0, depth = 0;
     const auto go = [&](const Vec3& to, bool judged) {
-      s.apply(MoveInstrument{0, to, {}, 0});
+      s.apply(scene::MoveInstrument{0, to, {}, 0});
       s.step(0.01);
       depth = test::larger(
           depth, test::surface_depth(model, s.displacement(0), shape, s.instrument(0).pose));
@@ -183,29 +186,30 @@ TEST(MeshInstrument, SlidAlongItsForceIsContinuous) {
 }
 
 TEST(MeshInstrument, NoWorkIsLeftOverAClosedWay) {
-  const InstrumentShape shape = jaw(0.8, 0);
+  const contact::InstrumentShape shape = jaw(0.8, 0);
   std::vector<double> left;
   for (const int steps : {20, 40, 80}) {
-    Simulation s(test::one_thread(), {});
-    s.add_object("o", organ(2), Method::ffe);
+    scene::Simulation s(test::one_thread(), {});
+    s.add_object("o", organ(2), scene::Method::ffe);
     const auto pose = [&](int k) {
       const double angle = 2 * 3.14159265358979323846 * k / steps;
-      return Pose{middle + Vec3{1.5 * std::sin(angle), 0.5 * std::sin(2 * angle),
-                                22.5 + 1.2 * std::cos(angle)},
-                  unit({0.8, 0.3 + 0.1 * std::sin(angle), -0.5 - 0.1 * std::cos(angle), 0.1})};
+      return contact::Pose{
+          middle +
+              Vec3{1.5 * std::sin(angle), 0.5 * std::sin(2 * angle), 22.5 + 1.2 * std::cos(angle)},
+          contact::unit({0.8, 0.3 + 0.1 * std::sin(angle), -0.5 - 0.1 * std::cos(angle), 0.1})};
     };
-    s.apply(SetInstrument{0, shape, {pose(0).place + Vec3{0, 0, 9}, pose(0).turn}});
+    s.apply(scene::SetInstrument{0, shape, {pose(0).place + Vec3{0, 0, 9}, pose(0).turn}});
     s.step(0.01);
     Felt last;
-    Pose before;
+    contact::Pose before;
     double work = 0, all = 0;
     for (int k = 0; k <= 2 * steps; ++k) {
-      s.apply(MoveInstrument{0, pose(k).place, pose(k).turn, 0});
+      s.apply(scene::MoveInstrument{0, pose(k).place, pose(k).turn, 0});
       s.step(0.01);
-      const InstrumentReport tool = s.instrument(0);
+      const scene::InstrumentReport tool = s.instrument(0);
       if (k > steps) { // the second time round
         // Of the mean force over the way, and of the mean torque over the turn.
-        const Quaternion &p = before.turn, &q = tool.pose.turn;
+        const contact::Quaternion &p = before.turn, &q = tool.pose.turn;
         const Vec3 from{p.x, p.y, p.z}, to{q.x, q.y, q.z};
         const Vec3 turn = 2 * (p.w * to - q.w * from + cross(from, to));
         const double one = 0.5 * (dot(last.force + tool.force, tool.pose.place - before.place) +
@@ -225,15 +229,15 @@ TEST(MeshInstrument, NoWorkIsLeftOverAClosedWay) {
 }
 
 TEST(MeshInstrument, AFastOneDoesNotPassThrough) {
-  for (const Method method : {Method::ffe, Method::ela}) {
-    Simulation s(test::one_thread(), {});
+  for (const scene::Method method : {scene::Method::ffe, scene::Method::ela}) {
+    scene::Simulation s(test::one_thread(), {});
     s.add_object("o", organ(3), method);
-    const InstrumentShape shape = jaw(0.5, 0);
-    s.apply(SetInstrument{0, shape, {middle + Vec3{0.3, 0.2, 26}, askew}});
+    const contact::InstrumentShape shape = jaw(0.5, 0);
+    s.apply(scene::SetInstrument{0, shape, {middle + Vec3{0.3, 0.2, 26}, askew}});
     s.step(0.01);
-    s.apply(MoveInstrument{0, middle + Vec3{0.3, 0.2, 20}, {}, 0});
+    s.apply(scene::MoveInstrument{0, middle + Vec3{0.3, 0.2, 20}, {}, 0});
     s.step(0.01);
-    const InstrumentReport tool = s.instrument(0);
+    const scene::InstrumentReport tool = s.instrument(0);
     EXPECT_LT(test::surface_depth(s.model(0), s.displacement(0), shape, tool.pose),
               test::depth_allowed);
     EXPECT_GT(tool.force.z, 0);
@@ -245,12 +249,12 @@ TEST(MeshInstrument, TheSameBytesForAnyNumberOfThreads) {
   for (const int threads : {1, 3}) {
     Context context;
     context.threads = threads;
-    Simulation s(context, {});
-    s.add_object("o", organ(3), Method::ela);
-    s.apply(SetInstrument{0, jaw(0.5, 0.3), {middle + Vec3{0.3, 0.2, 26}, askew}});
-    s.apply(MoveInstrument{0, middle + Vec3{0.3, 0.2, 22}, {}, 0.02});
+    scene::Simulation s(context, {});
+    s.add_object("o", organ(3), scene::Method::ela);
+    s.apply(scene::SetInstrument{0, jaw(0.5, 0.3), {middle + Vec3{0.3, 0.2, 26}, askew}});
+    s.apply(scene::MoveInstrument{0, middle + Vec3{0.3, 0.2, 22}, {}, 0.02});
     s.step(0.02);
-    const InstrumentReport tool = s.instrument(0);
+    const scene::InstrumentReport tool = s.instrument(0);
     found.emplace_back(s.displacement(0).begin(), s.displacement(0).end());
     for (const Vec3& v : {tool.force, tool.torque})
       found.back().insert(found.back().end(), {v.x, v.y, v.z});
@@ -259,4 +263,4 @@ TEST(MeshInstrument, TheSameBytesForAnyNumberOfThreads) {
 }
 
 } // namespace
-} // namespace gewebe
+} // namespace gewebe::test

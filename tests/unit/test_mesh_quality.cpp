@@ -8,7 +8,7 @@
 
 #include <numeric>
 
-namespace gewebe {
+namespace gewebe::test {
 namespace {
 
 /// The true largest frequency of unit masses with springs 1/L on the edges.
@@ -37,16 +37,16 @@ double omega_max(const TriangleMesh& mesh) {
 TEST(MeshQuality, ExplicitStepIsABound) {
   for (const double epsilon : {0.0, 0.15, 0.5}) {
     const TriangleMesh mesh =
-        snap({}, marching_cubes({}, scenes::metaballs(12, 2)), {epsilon}).mesh;
+        surface::snap({}, surface::marching_cubes({}, scenes::metaballs(12, 2)), {epsilon}).mesh;
     ASSERT_LT(mesh.points.size(), 400U);
-    const double limit = 2 / omega_max(mesh), step = mesh_quality(mesh).explicit_step;
+    const double limit = 2 / omega_max(mesh), step = mesh::mesh_quality(mesh).explicit_step;
     EXPECT_LE(step, limit * (1 + 1e-12)) << epsilon;
     EXPECT_GT(step, limit / 1.7) << epsilon;
   }
 }
 
 TEST(MeshQuality, OfABox) {
-  const MeshQuality quality = mesh_quality(test::box_mesh({0, 0, 0}, {1, 1, 1}));
+  const mesh::MeshQuality quality = mesh::mesh_quality(test::box_mesh({0, 0, 0}, {1, 1, 1}));
   EXPECT_EQ(quality.smallest_angles.counts[9], 12U); // 45 degrees
   EXPECT_EQ(quality.share_below_10, 0);
   EXPECT_NEAR(quality.angle_1_percent, 45, 1e-12);
@@ -61,7 +61,7 @@ TEST(MeshQuality, SeesSlivers) {
   TriangleMesh mesh;
   mesh.points = {{0, 0, 0}, {10, 0, 0}, {5, 0.1, 0}, {5, 8, 0}, {20, 0, 0}, {10, 0, 0}};
   mesh.triangles = {{0, 1, 2}, {0, 1, 3}, {0, 1, 4}, {1, 1, 2}, {1, 5, 3}};
-  const MeshQuality quality = mesh_quality(mesh);
+  const mesh::MeshQuality quality = mesh::mesh_quality(mesh);
   EXPECT_EQ(quality.smallest_angles.counts[0], 3U); // 1.1 degrees, and two without area
   EXPECT_NEAR(quality.share_below_10, 3.0 / 4, 1e-12);
   EXPECT_EQ(quality.angle_1_percent, 0);
@@ -70,16 +70,16 @@ TEST(MeshQuality, SeesSlivers) {
 }
 
 TEST(MeshQuality, HistogramsCountEverything) {
-  const TriangleMesh mesh = marching_cubes({}, scenes::metaballs(24, 4)).mesh;
-  const MeshQuality quality = mesh_quality(mesh);
-  const auto total = [](const Histogram& h) {
+  const TriangleMesh mesh = surface::marching_cubes({}, scenes::metaballs(24, 4)).mesh;
+  const mesh::MeshQuality quality = mesh::mesh_quality(mesh);
+  const auto total = [](const mesh::Histogram& h) {
     return std::accumulate(h.counts.begin(), h.counts.end(), std::uint64_t{0});
   };
   EXPECT_EQ(total(quality.smallest_angles), mesh.triangles.size());
   EXPECT_EQ(total(quality.areas), mesh.triangles.size());
   EXPECT_EQ(total(quality.edge_lengths), mesh.triangles.size() * 3 / 2);
-  EXPECT_EQ(total(mesh_quality({}).areas), 0U);
+  EXPECT_EQ(total(mesh::mesh_quality({}).areas), 0U);
 }
 
 } // namespace
-} // namespace gewebe
+} // namespace gewebe::test

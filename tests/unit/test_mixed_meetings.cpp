@@ -17,7 +17,7 @@
 #include <string>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::test {
 namespace {
 
 using namespace test;
@@ -28,23 +28,23 @@ constexpr double h = 1.0 / 600; ///< steps of one step of integration each
 constexpr double balance_met = 1e-5, balance_moving = 1e-2;
 
 /// A block that falls on an elastostatic one.
-void falls_on(Simulation& s, const Vec3& corner, double friction) {
+void falls_on(scene::Simulation& s, const Vec3& corner, double friction) {
   add_static(s, "below", block(5, 5, 2, {}, true));
   add(s, "above", block(3, 3, 2, corner));
-  s.apply(SetContact{0, 1, friction});
-  s.apply(SetGravity{{0, 0, -9810}});
-  s.apply(SetTimestep{h});
+  s.apply(scene::SetContact{0, 1, friction});
+  s.apply(scene::SetGravity{{0, 0, -9810}});
+  s.apply(scene::SetTimestep{h});
 }
 
-Load weight_alone() {
-  Load load;
+contact::Load weight_alone() {
+  contact::Load load;
   load.gravity = {0, 0, -9810};
   return load;
 }
 
 TEST(MixedMeetings, ABlockThatMovesRestsOnAnElastostaticOne) {
   for (const double friction : {0.0, 0.3}) {
-    Simulation s(one_thread(), {});
+    scene::Simulation s(one_thread(), {});
     falls_on(s, {3.7, 4.1, 8.3}, friction);
     bool touched = false;
     for (int k = 0; k < 160; ++k) {
@@ -70,18 +70,18 @@ TEST(MixedMeetings, ABlockThatMovesRestsOnAnElastostaticOne) {
 TEST(MixedMeetings, AtRestItIsAsIfBothMoved) {
   std::vector<double> sunk;
   for (const bool moves : {false, true}) {
-    Simulation s(one_thread(), {});
-    const Model below = block(5, 5, 2, {}, true);
+    scene::Simulation s(one_thread(), {});
+    const model::Model below = block(5, 5, 2, {}, true);
     if (moves)
       add(s, "below", below);
     else
       add_static(s, "below", below);
-    const Model above = block(3, 3, 2, {3.7, 4.1, 8.05});
+    const model::Model above = block(3, 3, 2, {3.7, 4.1, 8.05});
     add(s, "above", above);
-    s.apply(SetContact{0, 1, 0.4});
-    s.apply(SetGravity{{0, 0, -9810}});
-    s.apply(SetTimestep{h});
-    s.apply(SetForce{1, nodes_below(above, 9), {0, 0, -2000}});
+    s.apply(scene::SetContact{0, 1, 0.4});
+    s.apply(scene::SetGravity{{0, 0, -9810}});
+    s.apply(scene::SetTimestep{h});
+    s.apply(scene::SetForce{1, nodes_below(above, 9), {0, 0, -2000}});
     for (int k = 0; k < 60; ++k)
       s.step(1.0 / 60);
     sunk.push_back(s.displacement(1)[2]);
@@ -93,9 +93,9 @@ TEST(MixedMeetings, AtRestItIsAsIfBothMoved) {
 /// Neither what moves passes what stands in one step, nor the other way round.
 TEST(MixedMeetings, NothingJumpsThrough) {
   for (const bool static_jumps : {false, true}) {
-    Simulation s(one_thread(), {});
-    const Model above = hanging(3, 3, 2, {3.7, 4.1, 10.5});
-    const Model below = block(5, 5, 2, {}, true);
+    scene::Simulation s(one_thread(), {});
+    const model::Model above = hanging(3, 3, 2, {3.7, 4.1, 10.5});
+    const model::Model below = block(5, 5, 2, {}, true);
     const std::vector<std::uint32_t> lowest = nodes_below(above, 11);
     if (static_jumps) {
       add(s, "below", below);
@@ -104,11 +104,11 @@ TEST(MixedMeetings, NothingJumpsThrough) {
       add_static(s, "below", below);
       add(s, "above", above);
     }
-    s.apply(SetContact{0, 1, 0});
+    s.apply(scene::SetContact{0, 1, 0});
     s.step(h);
     const Vec3 force{0, 0, -100000.0};
-    s.apply(SetForce{1, lowest, force});
-    Load push;
+    s.apply(scene::SetForce{1, lowest, force});
+    contact::Load push;
     for (const std::uint32_t node : lowest)
       push.force[node] = force;
     bool touched = false;
@@ -135,12 +135,12 @@ TEST(MixedMeetings, FarApartNothingIsDifferent) {
 }
 
 /// A beam that is held at one end, over a block, and a ball that presses it down.
-void beam_over_block(Simulation& s, bool beam_moves) {
-  Model beam = block(8, 2, 1, {-8, 6, 8.4});
-  for (Node& node : beam.nodes)
+void beam_over_block(scene::Simulation& s, bool beam_moves) {
+  model::Model beam = block(8, 2, 1, {-8, 6, 8.4});
+  for (model::Node& node : beam.nodes)
     if (node.position.x < -7)
-      node.fixed = fixed_all;
-  const Model below = block(5, 5, 2, {}, true);
+      node.fixed = model::fixed_all;
+  const model::Model below = block(5, 5, 2, {}, true);
   if (beam_moves) {
     add_static(s, "below", below);
     add(s, "beam", beam);
@@ -148,21 +148,21 @@ void beam_over_block(Simulation& s, bool beam_moves) {
     add(s, "below", below);
     add_static(s, "beam", beam);
   }
-  s.apply(SetContact{0, 1, 0.2});
-  s.apply(SetTimestep{h});
+  s.apply(scene::SetContact{0, 1, 0.2});
+  s.apply(scene::SetTimestep{h});
 }
 
 TEST(MixedMeetings, AnInstrumentPressesOneOnAnother) {
   for (const bool beam_moves : {false, true})
     for (const bool led : {false, true}) {
-      Simulation s(one_thread(), {});
+      scene::Simulation s(one_thread(), {});
       beam_over_block(s, beam_moves);
-      s.apply(SetInstrument{0, ball_of(3), {{14, 10, 15.4}, {}}, "ball"});
+      s.apply(scene::SetInstrument{0, ball_of(3), {{14, 10, 15.4}, {}}, "ball"});
       if (led)
-        s.apply(SetCoupling{0, Coupling{1e5, 10}});
+        s.apply(scene::SetCoupling{0, contact::Coupling{1e5, 10}});
       for (int k = 0; k < 60; ++k) {
         if (k < 45)
-          s.apply(MoveInstrument{0, Vec3{14, 10, 15.4 - 0.04 * (k + 1)}, {}, h});
+          s.apply(scene::MoveInstrument{0, Vec3{14, 10, 15.4 - 0.04 * (k + 1)}, {}, h});
         s.step(h);
         EXPECT_GT(least_gap(s, 0, 1), 0) << k;
         const Vec3 on_ball = s.instrument(0).force;
@@ -172,7 +172,7 @@ TEST(MixedMeetings, AnInstrumentPressesOneOnAnother) {
       }
       for (int k = 0; k < 60; ++k)
         s.step(h);
-      const InstrumentReport ball = s.instrument(0);
+      const scene::InstrumentReport ball = s.instrument(0);
       EXPECT_GT(ball.force.z, 0) << beam_moves << led;
       EXPECT_LT(sum_of_forces(s, 0).z, 0) << beam_moves << led;
       EXPECT_LE(miss_of_balance(s, beam_moves ? 0 : 1, {}), balance_met);
@@ -184,18 +184,18 @@ TEST(MixedMeetings, AnInstrumentPressesOneOnAnother) {
 
 /// What lets go is as it was.
 TEST(MixedMeetings, WhatComesApartIsAsItWas) {
-  Simulation s(one_thread(), {});
-  const Model above = hanging(3, 3, 2, {3.7, 4.1, 8.3});
+  scene::Simulation s(one_thread(), {});
+  const model::Model above = hanging(3, 3, 2, {3.7, 4.1, 8.3});
   add_static(s, "below", block(5, 5, 2, {}, true));
   add(s, "above", above);
-  s.apply(SetContact{0, 1, 0.3});
-  s.apply(SetTimestep{h});
+  s.apply(scene::SetContact{0, 1, 0.3});
+  s.apply(scene::SetTimestep{h});
   const std::vector<std::uint32_t> lowest = nodes_below(above, 9);
-  s.apply(SetForce{1, lowest, {0, 0, -20000}});
+  s.apply(scene::SetForce{1, lowest, {0, 0, -20000}});
   for (int k = 0; k < 30; ++k)
     s.step(1.0 / 60);
   EXPECT_LT(sum_of_forces(s, 0).z, 0);
-  s.apply(SetForce{1, lowest, {0, 0, 20000}});
+  s.apply(scene::SetForce{1, lowest, {0, 0, 20000}});
   for (int k = 0; k < 30; ++k)
     s.step(1.0 / 60);
   EXPECT_TRUE(s.contact_forces(0).empty());
@@ -206,25 +206,25 @@ TEST(MixedMeetings, WhatComesApartIsAsItWas) {
 /// Of three in a row the midst hands on what presses it, whoever moves.
 TEST(MixedMeetings, ThreeInARow) {
   for (const unsigned moving : {1U, 2U, 4U, 3U, 5U, 6U}) {
-    Simulation s(one_thread(), {});
-    Model middle = block(3, 3, 1, {3.7, 4.1, 8.02});
-    for (Node& node : middle.nodes)
+    scene::Simulation s(one_thread(), {});
+    model::Model middle = block(3, 3, 1, {3.7, 4.1, 8.02});
+    for (model::Node& node : middle.nodes)
       if (node.position.x < 4)
-        node.fixed = fixed_x | fixed_y;
-    middle.nodes[0].fixed = fixed_all;
-    const Model above = hanging(2, 2, 2, {5.9, 6.3, 12.1});
-    const std::vector<Model> all{block(5, 5, 2, {}, true), middle, above};
+        node.fixed = model::fixed_x | model::fixed_y;
+    middle.nodes[0].fixed = model::fixed_all;
+    const model::Model above = hanging(2, 2, 2, {5.9, 6.3, 12.1});
+    const std::vector<model::Model> all{block(5, 5, 2, {}, true), middle, above};
     for (std::size_t k = 0; k < 3; ++k)
       if ((moving >> k & 1U) != 0)
         add(s, "block-" + std::to_string(k), all[k]);
       else
         add_static(s, "block-" + std::to_string(k), all[k]);
-    s.apply(SetContact{1, 0, 0});
-    s.apply(SetContact{2, 1, 0});
-    s.apply(SetTimestep{h});
+    s.apply(scene::SetContact{1, 0, 0});
+    s.apply(scene::SetContact{2, 1, 0});
+    s.apply(scene::SetTimestep{h});
     const std::vector<std::uint32_t> lowest = nodes_below(above, 13);
     for (int k = 1; k <= 120; ++k) {
-      s.apply(SetForce{2, lowest, {0, 0, -30.0 * k}});
+      s.apply(scene::SetForce{2, lowest, {0, 0, -30.0 * k}});
       s.step(h);
       const Vec3 sum = sum_of_forces(s, 0) + sum_of_forces(s, 1) + sum_of_forces(s, 2);
       EXPECT_LE(norm(sum), 1e-12 * (norm(sum_of_forces(s, 2)) + norm(sum_of_forces(s, 0))))
@@ -245,15 +245,15 @@ TEST(MixedMeetings, WhatFailsIsTakenBack) {
     for (const int threads : {1, 2}) {
       Context context = one_thread();
       context.threads = threads;
-      Simulation s(context, {.guard = true});
+      scene::Simulation s(context, {.guard = true});
       falls_on(s, {3.7, 4.1, 8.3}, 0.3);
-      s.apply(SetInstrument{0, ball_of(3), {{1, 1, 11.2}, {}}, "ball"});
+      s.apply(scene::SetInstrument{0, ball_of(3), {{1, 1, 11.2}, {}}, "ball"});
       for (int k = 1; k <= 40; ++k) {
-        s.apply(MoveInstrument{0, Vec3{1, 1, 11.2 - 0.02 * k}, {}, h});
+        s.apply(scene::MoveInstrument{0, Vec3{1, 1, 11.2 - 0.02 * k}, {}, h});
         if (k == 30 && fails) {
-          s.apply(SetForce{1, {0}, {1e39, 0, 0}}); // which is noticed in the step
+          s.apply(scene::SetForce{1, {0}, {1e39, 0, 0}}); // which is noticed in the step
           EXPECT_THROW(s.step(h), Error);
-          s.apply(Release{1, {0}});
+          s.apply(scene::Release{1, {0}});
         }
         s.step(h);
       }
@@ -268,14 +268,14 @@ TEST(MixedMeetings, WhatFailsIsTakenBack) {
 
 /// A load that jumps leads an elastostatic object over a gap that nobody took for near.
 TEST(MixedMeetings, WhoComesLateIsMet) {
-  Simulation s(one_thread(), {});
-  const Model above = hanging(3, 3, 2, {3.7, 4.1, 12});
+  scene::Simulation s(one_thread(), {});
+  const model::Model above = hanging(3, 3, 2, {3.7, 4.1, 12});
   add(s, "below", block(5, 5, 2, {}, true));
   add_static(s, "above", above);
-  s.apply(SetContact{0, 1, 0});
+  s.apply(scene::SetContact{0, 1, 0});
   s.step(h);
   std::vector<std::uint32_t> lowest = nodes_below(above, 13);
-  s.apply(SetDisplacement{1, lowest, {0, 0, -5}});
+  s.apply(scene::SetDisplacement{1, lowest, {0, 0, -5}});
   s.step(h);
   EXPECT_LT(sum_of_forces(s, 0).z, 0);
   EXPECT_GT(least_gap(s, 0, 1), 0);
@@ -286,14 +286,14 @@ TEST(MixedMeetings, WhoComesLateIsMet) {
 /// In the course of a step of the scene, in many steps of what moves: the mean of what presses is
 /// about half of what presses at the end.
 TEST(MixedMeetings, LoadsGoTheirWay) {
-  Simulation s(one_thread(), {});
-  const Model above = hanging(3, 3, 2, {3.7, 4.1, 8.02});
+  scene::Simulation s(one_thread(), {});
+  const model::Model above = hanging(3, 3, 2, {3.7, 4.1, 8.02});
   add(s, "below", block(5, 5, 2, {}, true));
   add_static(s, "above", above);
-  s.apply(SetContact{0, 1, 0});
-  s.apply(SetTimestep{h});
+  s.apply(scene::SetContact{0, 1, 0});
+  s.apply(scene::SetTimestep{h});
   s.step(0.1);
-  s.apply(SetDisplacement{1, nodes_below(above, 9), {0, 0, -0.5}});
+  s.apply(scene::SetDisplacement{1, nodes_below(above, 9), {0, 0, -0.5}});
   s.step(0.1);
   const double mean = -sum_of_forces(s, 0).z;
   s.step(0.1);
@@ -306,11 +306,11 @@ TEST(MixedMeetings, LoadsGoTheirWay) {
 TEST(MixedMeetings, WhatIsHeldAltogetherIsAnObstacle) {
   for (const bool floor_moves : {false, true})
     for (const bool above_moves : {false, true}) {
-      Simulation s(one_thread(), {});
-      Model floor = block(5, 5, 2, {}, true);
-      for (Node& node : floor.nodes)
-        node.fixed = fixed_all;
-      const Model above = hanging(3, 3, 2, {3.7, 4.1, 8.1});
+      scene::Simulation s(one_thread(), {});
+      model::Model floor = block(5, 5, 2, {}, true);
+      for (model::Node& node : floor.nodes)
+        node.fixed = model::fixed_all;
+      const model::Model above = hanging(3, 3, 2, {3.7, 4.1, 8.1});
       if (floor_moves)
         add(s, "floor", floor);
       else
@@ -319,9 +319,9 @@ TEST(MixedMeetings, WhatIsHeldAltogetherIsAnObstacle) {
         add(s, "above", above);
       else
         add_static(s, "above", above);
-      s.apply(SetContact{0, 1, 0});
-      s.apply(SetGravity{{0, 0, -9810}});
-      s.apply(SetForce{1, nodes_below(above, 9), {0, 0, -20000}});
+      s.apply(scene::SetContact{0, 1, 0});
+      s.apply(scene::SetGravity{{0, 0, -9810}});
+      s.apply(scene::SetForce{1, nodes_below(above, 9), {0, 0, -20000}});
       for (int k = 0; k < 40; ++k) {
         s.step(1.0 / 60);
         EXPECT_GT(least_gap(s, 0, 1), 0) << k;
@@ -336,4 +336,4 @@ TEST(MixedMeetings, WhatIsHeldAltogetherIsAnObstacle) {
 }
 
 } // namespace
-} // namespace gewebe
+} // namespace gewebe::test

@@ -17,86 +17,88 @@
 #include <set>
 #include <sstream>
 
-namespace gewebe {
+namespace gewebe::test {
 namespace {
 
 using test::area, test::ball, test::joined, test::octahedron, test::sheet;
 
-BuiltModel build(const TriangleMesh& mesh, const BuildOptions& options = {}) {
-  return build_model(mesh, options, Context{});
+model::BuiltModel build(const TriangleMesh& mesh, const model::BuildOptions& options = {}) {
+  return model::build_model(mesh, options, Context{});
 }
 
-std::string complaint(const Model& model) {
-  return test::complaint([&] { check_model(model); });
+std::string model_complaint(const model::Model& model) {
+  return test::complaint([&] { model::check_model(model); });
 }
 
 TEST(ModelBuild, ClosedSurfaceHasThreeHalvesEdgesPerFace) {
   for (int rounds = 0; rounds < 5; ++rounds) {
     const TriangleMesh mesh = ball(rounds);
-    const BuiltModel built = build(mesh);
-    const std::size_t v = surface_count(built.model),
-                      e = spring_count(built.model, SpringKind::edge),
+    const model::BuiltModel built = build(mesh);
+    const std::size_t v = model::surface_count(built.model),
+                      e = model::spring_count(built.model, model::SpringKind::edge),
                       f = built.model.triangles.size();
     EXPECT_EQ(v, mesh.points.size());
     EXPECT_EQ(2 * e, 3 * f);
     EXPECT_EQ(v + f, e + 2);
     EXPECT_EQ(built.report.boundary_edges, 0U);
-    EXPECT_EQ(components(built.model).count, 1U);
+    EXPECT_EQ(model::components(built.model).count, 1U);
   }
   // The count can fail: a face less opens three edges.
   TriangleMesh open = ball(2);
   open.triangles.pop_back();
-  const BuiltModel built = build(open);
-  EXPECT_NE(2 * spring_count(built.model, SpringKind::edge), 3 * built.model.triangles.size());
+  const model::BuiltModel built = build(open);
+  EXPECT_NE(2 * model::spring_count(built.model, model::SpringKind::edge),
+            3 * built.model.triangles.size());
   EXPECT_EQ(built.report.boundary_edges, 3U);
 }
 
 TEST(ModelBuild, MassIsDensityTimesThicknessTimesArea) {
-  BuildOptions options;
-  options.material = parse_material_choice("liver");
-  const Material& m = options.material.materials[0];
+  model::BuildOptions options;
+  options.material = model::parse_material_choice("liver");
+  const model::Material& m = options.material.materials[0];
   for (const TriangleMesh& mesh : {ball(3, 40), sheet(7, 5, 3)}) {
-    const BuiltModel built = build(mesh, options);
+    const model::BuiltModel built = build(mesh, options);
     const double expected = m.density * m.thickness * area(mesh);
-    EXPECT_NEAR(total_mass(built.model), expected, 1e-12 * expected);
+    EXPECT_NEAR(model::total_mass(built.model), expected, 1e-12 * expected);
     EXPECT_EQ(built.report.light_nodes, 0U);
     // It can fail: twice the thickness is not within the bound.
-    EXPECT_GT(std::abs(2 * expected - total_mass(built.model)), 1e-12 * expected);
+    EXPECT_GT(std::abs(2 * expected - model::total_mass(built.model)), 1e-12 * expected);
   }
   options.mass = 0.25;
-  EXPECT_EQ(total_mass(build(octahedron(), options).model), 1.5);
+  EXPECT_EQ(model::total_mass(build(octahedron(), options).model), 1.5);
 }
 
 TEST(ModelBuild, StiffnessIsVanGelders) {
   // Every edge of a regular octahedron of edge √2 has two faces of area √3/2, so ΣA/l² = √3/2.
-  BuildOptions options;
+  model::BuildOptions options;
   options.material.materials[0].young = 2000;
   options.material.materials[0].thickness = 3;
-  const Model model = build(octahedron(), options).model;
-  for (const Spring& s : model.springs) {
-    if (s.kind != SpringKind::edge)
+  const model::Model model = build(octahedron(), options).model;
+  for (const model::Spring& s : model.springs) {
+    if (s.kind != model::SpringKind::edge)
       continue;
     EXPECT_NEAR(s.stiffness, 2000 * 3 * std::sqrt(3.0) / 2, 1e-9);
     EXPECT_NEAR(s.rest, std::sqrt(2.0), 1e-15);
   }
   options.stiffness = 77;
-  const Model constant = build(octahedron(), options).model;
+  const model::Model constant = build(octahedron(), options).model;
   // Central springs share 1000 F k by the nodes' areas: here six alike.
-  for (const Spring& s : constant.springs)
-    EXPECT_NEAR(s.stiffness, s.kind == SpringKind::central ? 77 * 0.1 * 1000 / 6 : 77, 1e-9 * 77);
+  for (const model::Spring& s : constant.springs)
+    EXPECT_NEAR(s.stiffness, s.kind == model::SpringKind::central ? 77 * 0.1 * 1000 / 6 : 77,
+                1e-9 * 77);
   // Independent of the unit of length: k of a similar mesh is the same.
   options.stiffness.reset();
-  const Model large = build(ball(0, 1e6), options).model;
+  const model::Model large = build(ball(0, 1e6), options).model;
   EXPECT_NEAR(large.springs[0].stiffness, model.springs[0].stiffness,
               1e-9 * model.springs[0].stiffness);
 }
 
 TEST(ModelBuild, DampingRatioIsThatOfTwoMasses) {
-  BuildOptions options;
+  model::BuildOptions options;
   options.material.materials[0].damping_ratio = 1;
   options.stiffness = 8;
   options.mass = 4;
-  const Model model = build(octahedron(), options).model;
+  const model::Model model = build(octahedron(), options).model;
   // Critical for the relative motion: c = 2 √(k μ), μ = m/2 between equal masses, m against a fixed
   // one.
   EXPECT_DOUBLE_EQ(model.springs.front().damping, 2 * std::sqrt(8.0 * 2));
@@ -110,30 +112,30 @@ TEST(ModelBuild, DampingRatioOfASpringIsTheMeanOfItsEnds) {
   strip.points = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {1, 1, 0}};
   strip.triangles = {{0, 1, 2}, {1, 3, 2}};
   strip.part = {0, 1};
-  BuildOptions options;
-  options.material.materials.assign(2, material_presets()[0]);
+  model::BuildOptions options;
+  options.material.materials.assign(2, model::material_presets()[0]);
   options.material.of_part = {0, 1};
   options.material.materials[0].damping_ratio = 0.2;
   options.material.materials[1].damping_ratio = 0.8;
   options.stiffness = 8;
   options.mass = 4;
   options.centrals = 0;
-  for (const Spring& s : build(strip, options).model.springs)
+  for (const model::Spring& s : build(strip, options).model.springs)
     EXPECT_DOUBLE_EQ(s.damping, 2 * (s.j == 3 ? 0.5 : 0.2) * std::sqrt(8.0 * 2)) << s.i << s.j;
 }
 
 /// Mean displacement, weighted by the load, under a total load of 1 that falls off from `place` to
 /// `reach`, by area.
-double response(const Model& model, Elastostatic& solver, const Vec3& place, double reach,
-                const Vec3& along) {
+double response(const model::Model& model, statics::Elastostatic& solver, const Vec3& place,
+                double reach, const Vec3& along) {
   std::vector<double> area(model.nodes.size());
   const auto at = [&](std::uint32_t i) { return model.nodes[i].position; };
   for (const Triangle& t : model.triangles)
     for (const std::uint32_t corner : t)
       area[corner] += norm(cross(at(t[1]) - at(t[0]), at(t[2]) - at(t[0]))) / 6;
-  Load load;
+  contact::Load load;
   double total = 0;
-  for (std::uint32_t i = 0; i < surface_count(model); ++i)
+  for (std::uint32_t i = 0; i < model::surface_count(model); ++i)
     if (const double far = norm(at(i) - place) / reach; far < 1) {
       const double weight = (1 - far * far) * (1 - far * far) * area[i];
       load.force[i] = weight * along;
@@ -149,8 +151,8 @@ double response(const Model& model, Elastostatic& solver, const Vec3& place, dou
 }
 
 /// The mean over some places, of loads across the surface and along it.
-double mean_response(const Model& model, double radius) {
-  Elastostatic solver(model, {}, Context{});
+double mean_response(const model::Model& model, double radius) {
+  statics::Elastostatic solver(model, {}, Context{});
   double sum = 0;
   for (const Vec3& out :
        {Vec3{0, 0, 1}, Vec3{1, 0, 0}, Vec3{0.6, 0.64, 0.48}, Vec3{-0.6, 0.48, -0.64}}) {
@@ -162,26 +164,26 @@ double mean_response(const Model& model, double radius) {
 }
 
 /// Central springs as they once were: F times the mean of the node's edge springs.
-void weight_by_node(Model& model) {
+void weight_by_node(model::Model& model) {
   std::vector<double> sum(model.nodes.size()), count(model.nodes.size());
-  for (const Spring& s : model.springs)
-    if (s.kind == SpringKind::edge)
+  for (const model::Spring& s : model.springs)
+    if (s.kind == model::SpringKind::edge)
       for (const std::uint32_t i : {s.i, s.j}) {
         sum[i] += s.stiffness;
         count[i] += 1;
       }
-  for (Spring& s : model.springs)
-    if (s.kind == SpringKind::central)
+  for (model::Spring& s : model.springs)
+    if (s.kind == model::SpringKind::central)
       s.stiffness = 0.1 * sum[s.i] / count[s.i];
 }
 
 TEST(ModelBuild, ResponseDoesNotDependOnTheResolution) {
   for (const bool bend : {false, true}) {
-    BuildOptions options;
+    model::BuildOptions options;
     options.bend = bend;
     std::vector<double> by_area, by_node;
     for (const int levels : {3, 4, 5}) { // 642, 2,562 and 10,242 nodes
-      Model model = build(test::sphere_mesh(levels, 30, {}), options).model;
+      model::Model model = build(test::sphere_mesh(levels, 30, {}), options).model;
       by_area.push_back(mean_response(model, 30));
       weight_by_node(model);
       by_node.push_back(mean_response(model, 30));
@@ -214,37 +216,38 @@ TEST(ModelBuild, CentralPlacesFollowTheShapeNotTheNet) {
   uneven.triangles = split;
   for (Vec3& p : uneven.points)
     p = {1.6 * p.x, 1.2 * p.y + 0.01 * p.x * p.x, p.z};
-  const Model a = build(even).model, b = build(uneven).model;
+  const model::Model a = build(even).model, b = build(uneven).model;
   for (std::size_t c = 0; c < 4; ++c) {
     double nearest = HUGE_VAL;
     for (std::size_t d = 0; d < 4; ++d)
-      nearest = test::smaller(nearest, norm(a.nodes[surface_count(a) + c].position -
-                                            b.nodes[surface_count(b) + d].position));
+      nearest = test::smaller(nearest, norm(a.nodes[model::surface_count(a) + c].position -
+                                            b.nodes[model::surface_count(b) + d].position));
     EXPECT_TRUE(nearest <= 6) << c << ' ' << nearest; // of 96 mm
   }
 }
 
 TEST(ModelBuild, BendingSpringsCrossInnerEdges) {
-  BuildOptions options;
+  model::BuildOptions options;
   options.bend = true;
   // Two triangles share one edge; an octahedron's twelve pairs are three diagonals, each met four
   // times.
-  EXPECT_EQ(spring_count(build(sheet(1, 1), options).model, SpringKind::bend), 1U);
-  const Model model = build(octahedron(), options).model;
+  EXPECT_EQ(model::spring_count(build(sheet(1, 1), options).model, model::SpringKind::bend), 1U);
+  const model::Model model = build(octahedron(), options).model;
   std::set<std::pair<std::uint32_t, std::uint32_t>> pairs;
-  for (const Spring& s : model.springs)
-    if (s.kind == SpringKind::bend)
+  for (const model::Spring& s : model.springs)
+    if (s.kind == model::SpringKind::bend)
       pairs.insert({s.i, s.j});
   EXPECT_EQ(pairs, (std::set<std::pair<std::uint32_t, std::uint32_t>>{{0, 1}, {2, 3}, {4, 5}}));
   // In a tetrahedron all such pairs are edges already.
   TriangleMesh tetrahedron;
   tetrahedron.points = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
   tetrahedron.triangles = {{0, 2, 1}, {0, 1, 3}, {1, 2, 3}, {2, 0, 3}};
-  EXPECT_EQ(spring_count(build(tetrahedron, options).model, SpringKind::bend), 0U);
+  EXPECT_EQ(model::spring_count(build(tetrahedron, options).model, model::SpringKind::bend), 0U);
   // On a fine ball every edge has its own pair, but for the six nodes of four edges: two pairs,
   // each met twice.
-  const Model fine = build(ball(2), options).model;
-  EXPECT_EQ(spring_count(fine, SpringKind::bend) + 12, spring_count(fine, SpringKind::edge));
+  const model::Model fine = build(ball(2), options).model;
+  EXPECT_EQ(model::spring_count(fine, model::SpringKind::bend) + 12,
+            model::spring_count(fine, model::SpringKind::edge));
 }
 
 TEST(ModelBuild, BendingSpringsAreTheirFactorTimesTheEdgeTheyCross) {
@@ -252,15 +255,15 @@ TEST(ModelBuild, BendingSpringsAreTheirFactorTimesTheEdgeTheyCross) {
   TriangleMesh mesh;
   mesh.points = {{0, 0, 0}, {2, 0, 0}, {0, 3, 0}, {4, 5, 1}};
   mesh.triangles = {{0, 1, 2}, {1, 3, 2}};
-  BuildOptions options;
+  model::BuildOptions options;
   options.centrals = 0;
   options.bend = true;
   options.bend_factor = 0.3;
   options.material.materials[0].young = 700;
   options.material.materials[0].thickness = 2;
   std::size_t bends = 0;
-  for (const Spring& s : build(mesh, options).model.springs)
-    if (s.kind == SpringKind::bend) {
+  for (const model::Spring& s : build(mesh, options).model.springs)
+    if (s.kind == model::SpringKind::bend) {
       ++bends;
       EXPECT_EQ(s.i, 0U);
       EXPECT_EQ(s.j, 3U);
@@ -280,22 +283,22 @@ TEST(ModelBuild, FacesThatAreLeftOutTakeTheirNumbersWithThem) {
     mesh.texcoords.push_back({number(t), 1, 2, 3, 4, 5});
     mesh.part.push_back(t[0] > 8 ? 1 : 0);
   }
-  BuildOptions options;
-  options.material.materials.assign(2, material_presets()[0]);
+  model::BuildOptions options;
+  options.material.materials.assign(2, model::material_presets()[0]);
   options.material.of_part = {0, 1};
   options.material.materials[1].density *= 2;
-  const BuiltModel built = build(mesh, options);
+  const model::BuiltModel built = build(mesh, options);
   EXPECT_EQ(built.report.degenerate_faces, 1U);
   EXPECT_EQ(built.report.duplicate_faces, 1U);
   ASSERT_EQ(built.model.triangles.size(), faces.size());
   ASSERT_EQ(built.model.texcoords.size(), faces.size());
-  std::vector<double> mass(surface_count(built.model));
+  std::vector<double> mass(model::surface_count(built.model));
   for (std::size_t f = 0; f < faces.size(); ++f) {
     const Triangle& t = built.model.triangles[f];
     EXPECT_EQ(t, faces[f]) << f;
     EXPECT_EQ(built.model.texcoords[f][0], static_cast<double>(number(t))) << f;
     const auto& p = mesh.points;
-    const Material& m = options.material.materials[t[0] > 8 ? 1 : 0];
+    const model::Material& m = options.material.materials[t[0] > 8 ? 1 : 0];
     for (const std::uint32_t corner : t)
       mass[corner] +=
           m.density * m.thickness * norm(cross(p[t[1]] - p[t[0]], p[t[2]] - p[t[0]])) / 6;
@@ -306,13 +309,13 @@ TEST(ModelBuild, FacesThatAreLeftOutTakeTheirNumbersWithThem) {
 
 TEST(ModelBuild, CentralNodesTieEveryNodeToItsOwnComponent) {
   const TriangleMesh mesh = joined(ball(2, 1), ball(3, 2, {10, 0, 0}));
-  const BuiltModel built = build(mesh);
-  const Model& model = built.model;
-  const std::size_t surface = surface_count(model);
+  const model::BuiltModel built = build(mesh);
+  const model::Model& model = built.model;
+  const std::size_t surface = model::surface_count(model);
   EXPECT_EQ(surface, mesh.points.size());
   EXPECT_EQ(model.nodes.size(), surface + 8);
-  EXPECT_EQ(spring_count(model, SpringKind::central), surface);
-  const Components parts = components(model);
+  EXPECT_EQ(model::spring_count(model, model::SpringKind::central), surface);
+  const model::Components parts = model::components(model);
   ASSERT_EQ(parts.count, 2U);
   EXPECT_EQ(parts.of_node[0], 0U);
   std::vector<Vec3> mean(model.nodes.size());
@@ -331,14 +334,14 @@ TEST(ModelBuild, CentralNodesTieEveryNodeToItsOwnComponent) {
     size[c] += 1;
   }
   for (std::size_t c = surface; c < model.nodes.size(); ++c) {
-    EXPECT_EQ(model.nodes[c].fixed, fixed_all);
+    EXPECT_EQ(model.nodes[c].fixed, model::fixed_all);
     EXPECT_EQ(parts.of_node[c], c < surface + 4 ? 0U : 1U); // component by component
     // The mean of the surface that is nearest to it, which its nodes tell but roughly.
     EXPECT_LE(norm(mean[c] / size[c] - model.nodes[c].position), 0.2);
   }
-  BuildOptions options;
+  model::BuildOptions options;
   options.centrals_free = true;
-  EXPECT_EQ(build(mesh, options).model.nodes.back().fixed, fixed_none);
+  EXPECT_EQ(build(mesh, options).model.nodes.back().fixed, model::fixed_none);
   options.centrals = 0;
   EXPECT_EQ(build(mesh, options).model.nodes.size(), surface);
 }
@@ -347,18 +350,18 @@ TEST(ModelBuild, SmallComponentsGetFewerCentrals) {
   TriangleMesh triangle;
   triangle.points = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}};
   triangle.triangles = {{0, 1, 2}};
-  const Model one = build(triangle).model;
+  const model::Model one = build(triangle).model;
   EXPECT_EQ(one.nodes.size(), 4U);
-  EXPECT_EQ(spring_count(one, SpringKind::central), 3U);
+  EXPECT_EQ(model::spring_count(one, model::SpringKind::central), 3U);
   // A hub at the very place of its central node has no direction to it, hence no spring.
   TriangleMesh fan;
   fan.points = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {-1, 0, 0}, {0, -1, 0}};
   fan.triangles = {{0, 1, 2}, {0, 2, 3}, {0, 3, 4}, {0, 4, 1}};
-  BuildOptions options;
+  model::BuildOptions options;
   options.centrals = 1;
-  const Model hub = build(fan, options).model;
+  const model::Model hub = build(fan, options).model;
   EXPECT_EQ(hub.nodes[0].central, 5);
-  EXPECT_EQ(spring_count(hub, SpringKind::central), 4U);
+  EXPECT_EQ(model::spring_count(hub, model::SpringKind::central), 4U);
 }
 
 TEST(ModelBuild, ClustersAreStationaryAndTheSameForAnyThreads) {
@@ -366,23 +369,26 @@ TEST(ModelBuild, ClustersAreStationaryAndTheSameForAnyThreads) {
   Context one, two;
   one.threads = 1;
   two.threads = 2;
-  const Clusters a = cluster_points(mesh.points, 7, one), b = cluster_points(mesh.points, 7, two);
+  const model::Clusters a = model::cluster_points(mesh.points, 7, one),
+                        b = model::cluster_points(mesh.points, 7, two);
   EXPECT_EQ(a.of_point, b.of_point);
   ASSERT_EQ(a.centers.size(), 7U);
   for (std::size_t c = 0; c < 7; ++c)
     EXPECT_EQ(a.centers[c], b.centers[c]);
   EXPECT_EQ(std::set<std::uint32_t>(a.of_point.begin(), a.of_point.end()).size(), 7U);
 
-  EXPECT_EQ(build_model(mesh, {}, one).model, build_model(mesh, {}, two).model);
+  EXPECT_EQ(model::build_model(mesh, {}, one).model, model::build_model(mesh, {}, two).model);
   // Weights pull the means.
   const std::vector<Vec3> row{{0, 0, 0}, {3, 0, 0}};
-  EXPECT_EQ(cluster_points(row, 1, one, std::vector<double>{1, 2}).centers[0], (Vec3{2, 0, 0}));
-  const Clusters near = nearest_clusters(row, {{-9, 0, 0}, {1, 0, 0}, {2, 0, 0}}, one);
+  EXPECT_EQ(model::cluster_points(row, 1, one, std::vector<double>{1, 2}).centers[0],
+            (Vec3{2, 0, 0}));
+  const model::Clusters near =
+      model::nearest_clusters(row, {{-9, 0, 0}, {1, 0, 0}, {2, 0, 0}}, one);
   EXPECT_EQ(near.of_point, (std::vector<std::uint32_t>{0, 1}));
   ASSERT_EQ(near.centers.size(), 2U); // the one that is nobody's nearest is gone
   EXPECT_EQ(near.centers[0], (Vec3{1, 0, 0}));
   // More places than points, and points that coincide.
-  EXPECT_EQ(cluster_points({{0, 0, 0}, {0, 0, 0}, {1, 0, 0}}, 5, one).centers.size(), 2U);
+  EXPECT_EQ(model::cluster_points({{0, 0, 0}, {0, 0, 0}, {1, 0, 0}}, 5, one).centers.size(), 2U);
 }
 
 // Points whose center is known without a comparison with all of them get the one that comparing
@@ -400,9 +406,9 @@ TEST(Model, ClustersAreWhatComparingAllFinds) {
       weights.push_back(1 + place(random) / 2);
     }
     for (const std::size_t count : {1U, 2U, 9U, 40U}) {
-      const Clusters found = cluster_points(points, count, {}, weights);
+      const model::Clusters found = model::cluster_points(points, count, {}, weights);
       // At rest a center is the mean of the points that are nearest to it.
-      const Clusters again = nearest_clusters(points, found.centers, {});
+      const model::Clusters again = model::nearest_clusters(points, found.centers, {});
       EXPECT_EQ(again.of_point, found.of_point) << count;
       std::vector<Vec3> sum(found.centers.size());
       std::vector<double> size(found.centers.size());
@@ -418,7 +424,7 @@ TEST(Model, ClustersAreWhatComparingAllFinds) {
 
 TEST(ModelBuild, BadFacesAreLeftOutAndCounted) {
   TriangleMesh mesh = octahedron();
-  const Model clean = build(mesh).model;
+  const model::Model clean = build(mesh).model;
   mesh.points.insert(mesh.points.begin() + 2, Vec3{50, 50, 50}); // no face's
   for (Triangle& t : mesh.triangles)
     for (std::uint32_t& corner : t)
@@ -428,7 +434,7 @@ TEST(ModelBuild, BadFacesAreLeftOutAndCounted) {
       {mesh.triangles[1][1], mesh.triangles[1][2], mesh.triangles[1][0]}); // twice
   mesh.triangles.push_back(
       {mesh.triangles[2][1], mesh.triangles[2][0], mesh.triangles[2][2]}); // turned
-  const BuiltModel built = build(mesh);
+  const model::BuiltModel built = build(mesh);
   EXPECT_EQ(built.model, clean);
   EXPECT_EQ(built.report.isolated_points, 1U);
   EXPECT_EQ(built.report.degenerate_faces, 1U);
@@ -443,10 +449,10 @@ TEST(ModelBuild, BadFacesAreLeftOutAndCounted) {
 TEST(ModelBuild, CoincidentPointsMakeNoSpring) {
   TriangleMesh mesh = sheet(2, 2);
   mesh.points[4] = mesh.points[8]; // a face without area, an edge without length
-  const BuiltModel built = build(mesh);
+  const model::BuiltModel built = build(mesh);
   EXPECT_EQ(built.report.zero_length_edges, 1U);
-  EXPECT_EQ(complaint(built.model), "");
-  for (const Spring& s : built.model.springs)
+  EXPECT_EQ(model_complaint(built.model), "");
+  for (const model::Spring& s : built.model.springs)
     EXPECT_GT(s.rest, 0);
   for (Vec3& p : mesh.points)
     p = {1, 2, 3};
@@ -470,13 +476,13 @@ TEST(ModelBuild, AnySoupOfTrianglesGivesAValidModel) {
       mesh.triangles.push_back({static_cast<std::uint32_t>(random() % 12),
                                 static_cast<std::uint32_t>(random() % 12),
                                 static_cast<std::uint32_t>(random() % 12)});
-    BuildOptions options;
+    model::BuildOptions options;
     options.bend = options.normals = true;
     options.centrals = static_cast<std::int64_t>(random() % 4);
     try {
-      const BuiltModel built = build(mesh, options);
-      ASSERT_EQ(complaint(built.model), "");
-      EXPECT_TRUE(safe_step(built.model) > 0);
+      const model::BuiltModel built = build(mesh, options);
+      ASSERT_EQ(model_complaint(built.model), "");
+      EXPECT_TRUE(model::safe_step(built.model) > 0);
       EXPECT_EQ(built.model.triangles.size() + built.report.degenerate_faces +
                     built.report.duplicate_faces,
                 faces);
@@ -494,38 +500,38 @@ TEST(ModelBuild, AnySoupOfTrianglesGivesAValidModel) {
 }
 
 TEST(ModelBuild, PartsHaveTheirOwnMaterials) {
-  BuildOptions options;
-  options.material = parse_material_choice("liver,1=gallbladder");
-  const Model model = build(joined(octahedron(), ball(0, 1, {9, 0, 0})), options).model;
+  model::BuildOptions options;
+  options.material = model::parse_material_choice("liver,1=gallbladder");
+  const model::Model model = build(joined(octahedron(), ball(0, 1, {9, 0, 0})), options).model;
   ASSERT_EQ(model.materials.size(), 2U);
   EXPECT_EQ(model.nodes[0].material, 0);
   EXPECT_EQ(model.nodes[6].material, 1);
   EXPECT_EQ(model.nodes.back().material, 1);
   const double ratio = model.springs[12].stiffness / model.springs[0].stiffness;
   EXPECT_NEAR(ratio, 2.5e5 * 3 / (5500 * 10), 1e-9);
-  EXPECT_EQ(surface_mesh(model).material.size(), 16U);
+  EXPECT_EQ(model::surface_mesh(model).material.size(), 16U);
 
-  EXPECT_EQ(parse_material_choice("0=uterus,3=liver").of_part,
+  EXPECT_EQ(model::parse_material_choice("0=uterus,3=liver").of_part,
             (std::vector<std::int32_t>{1, 0, 0, 2}));
   for (const char* bad : {"", "bone", "liver,uterus", "0=liver,0=uterus", "-1=liver", "=liver",
                           "1=", "liver,", "1=liver,uterus", "99999999=liver"})
-    EXPECT_THROW(parse_material_choice(bad), Error) << bad;
+    EXPECT_THROW(model::parse_material_choice(bad), Error) << bad;
 }
 
 TEST(ModelBuild, PartsAreChosenByNameToo) {
   const std::vector<std::string> names{"lobe", "bile duct", "", "lobe"};
-  MaterialChoice choice = parse_material_choice("uterus,lobe=liver,1=gallbladder");
+  model::MaterialChoice choice = model::parse_material_choice("uterus,lobe=liver,1=gallbladder");
   EXPECT_EQ(choice.named, (std::vector<std::int32_t>{1}));
-  number_parts(choice, names);
+  model::number_parts(choice, names);
   EXPECT_EQ(choice.named, (std::vector<std::int32_t>{0, 1, 3}));
   for (const auto& [part, material] :
        {std::pair(0, "liver"), {1, "gallbladder"}, {2, "uterus"}, {3, "liver"}, {4, "uterus"}})
-    EXPECT_EQ(choice.materials[static_cast<std::size_t>(chosen_material(choice, part))].name,
+    EXPECT_EQ(choice.materials[static_cast<std::size_t>(model::chosen_material(choice, part))].name,
               material);
-  EXPECT_EQ(choice, parse_material_choice("uterus,0=liver,1=gallbladder,3=liver"));
+  EXPECT_EQ(choice, model::parse_material_choice("uterus,0=liver,1=gallbladder,3=liver"));
   const auto fault = [&](const char* text, const std::vector<std::string>& of) {
-    MaterialChoice wrong = parse_material_choice(text);
-    return test::complaint([&] { number_parts(wrong, of); });
+    model::MaterialChoice wrong = model::parse_material_choice(text);
+    return test::complaint([&] { model::number_parts(wrong, of); });
   };
   EXPECT_EQ(fault("duct=liver", names),
             "there is no part 'duct' to give a material, expected one of bile duct, lobe");
@@ -538,33 +544,33 @@ TEST(ModelBuild, PartsAreChosenByNameToo) {
 TEST(ModelBuild, NormalsAndTextureCoordinates) {
   TriangleMesh mesh = ball(3, 5, {1, 2, 3});
   mesh.texcoords.assign(mesh.triangles.size(), {0.1F, 0.2F, 1e-9F, -3, 0.7F, 1});
-  BuildOptions options;
+  model::BuildOptions options;
   options.normals = true;
-  const Model model = build(mesh, options).model;
+  const model::Model model = build(mesh, options).model;
   ASSERT_EQ(model.normals.size(), model.nodes.size());
-  for (std::size_t i = 0; i < surface_count(model); ++i) {
+  for (std::size_t i = 0; i < model::surface_count(model); ++i) {
     const Vec3 outward = (model.nodes[i].position - Vec3{1, 2, 3}) / 5;
     EXPECT_GT(dot(model.normals[i], outward), 0.99);
   }
   EXPECT_EQ(model.normals.back(), Vec3{});
   EXPECT_EQ(model.texcoords[0][0], 0.1); // the decimal number, not the float's binary tail
-  EXPECT_EQ(surface_mesh(model).texcoords, mesh.texcoords);
-  EXPECT_EQ(surface_mesh(model).points, mesh.points);
-  EXPECT_EQ(surface_mesh(model).triangles, mesh.triangles);
+  EXPECT_EQ(model::surface_mesh(model).texcoords, mesh.texcoords);
+  EXPECT_EQ(model::surface_mesh(model).points, mesh.points);
+  EXPECT_EQ(model::surface_mesh(model).triangles, mesh.triangles);
 }
 
 // ---- the safe step
 
-Model two_masses(double mass, double stiffness, double damping, double drag) {
-  Model m;
+model::Model two_masses(double mass, double stiffness, double damping, double drag) {
+  model::Model m;
   m.materials.emplace_back();
   m.nodes.resize(2);
   m.nodes[1].position = {2, 0, 0};
-  for (Node& n : m.nodes) {
+  for (model::Node& n : m.nodes) {
     n.mass = mass;
     n.drag = drag;
   }
-  m.springs = {{0, 1, SpringKind::edge, stiffness, damping, 2}};
+  m.springs = {{0, 1, model::SpringKind::edge, stiffness, damping, 2}};
   return m;
 }
 
@@ -583,42 +589,42 @@ TEST(ModelSafeStep, IsTheSpectralBoundOfTwoMasses) {
     for (const double stiffness : {1e-3, 1.0, 1e6})
       for (const double damping : {0.0, 1e-3, 5.0})
         for (const double drag : {0.0, 0.1}) {
-          const double h = safe_step(two_masses(mass, stiffness, damping, drag));
+          const double h = model::safe_step(two_masses(mass, stiffness, damping, drag));
           const double omega2 = 2 * stiffness / mass, gamma = (2 * damping + drag) / mass;
           EXPECT_LE(growth(0.999 * h, omega2, gamma), 1 + 1e-9);
           EXPECT_GT(growth(1.001 * h, omega2, gamma), 1 + 1e-9);
           const double design = (std::sqrt(gamma * gamma + 4 * omega2) - gamma) / omega2;
           EXPECT_NEAR(h, design, 1e-6 * h);
         }
-  EXPECT_DOUBLE_EQ(safe_step(two_masses(3, 0, 0, 6)), 1); // drag alone: 2 m / d
-  EXPECT_EQ(safe_step(two_masses(1, 0, 0, 0)), HUGE_VAL);
-  EXPECT_EQ(safe_step(two_masses(0, 1, 0, 0)), 0);
+  EXPECT_DOUBLE_EQ(model::safe_step(two_masses(3, 0, 0, 6)), 1); // drag alone: 2 m / d
+  EXPECT_EQ(model::safe_step(two_masses(1, 0, 0, 0)), HUGE_VAL);
+  EXPECT_EQ(model::safe_step(two_masses(0, 1, 0, 0)), 0);
 }
 
 TEST(ModelSafeStep, IgnoresNodesThatCannotMove) {
-  Model m = two_masses(1, 1, 0, 0);
+  model::Model m = two_masses(1, 1, 0, 0);
   m.nodes[1].mass = 1e-9;
-  EXPECT_LT(safe_step(m), 1e-3);
-  m.nodes[1].fixed = fixed_all;
-  EXPECT_DOUBLE_EQ(safe_step(m), 2);
+  EXPECT_LT(model::safe_step(m), 1e-3);
+  m.nodes[1].fixed = model::fixed_all;
+  EXPECT_DOUBLE_EQ(model::safe_step(m), 2);
 }
 
 TEST(ModelSafeStep, SemiImplicitEulerStaysBoundedBelowItAndNotFarAbove) {
   // All nodes of a ball are kicked; explicit damping, semi-implicit Euler, linear and non-linear
   // force.
-  const Model model = build(ball(2, 20)).model;
+  const model::Model model = build(ball(2, 20)).model;
   const auto energy_after = [&](double h, int steps) {
     std::vector<Vec3> x, v;
-    for (const Node& n : model.nodes) {
+    for (const model::Node& n : model.nodes) {
       x.push_back(n.position);
       v.emplace_back();
     }
-    for (std::size_t i = 0; i < surface_count(model); ++i)
+    for (std::size_t i = 0; i < model::surface_count(model); ++i)
       v[i] = {0.01 * static_cast<double>(i % 7), -0.02 * static_cast<double>(i % 3), 0.01};
     double energy = 0;
     for (int step = 0; step < steps; ++step) {
       std::vector<Vec3> force(x.size());
-      for (const Spring& s : model.springs) {
+      for (const model::Spring& s : model.springs) {
         const Vec3 d = x[s.j] - x[s.i];
         const double l = norm(d);
         const Vec3 n = d / l;
@@ -628,8 +634,8 @@ TEST(ModelSafeStep, SemiImplicitEulerStaysBoundedBelowItAndNotFarAbove) {
       }
       energy = 0;
       for (std::size_t i = 0; i < x.size(); ++i) {
-        const Node& n = model.nodes[i];
-        if (n.fixed == fixed_all)
+        const model::Node& n = model.nodes[i];
+        if (n.fixed == model::fixed_all)
           continue;
         v[i] += (force[i] - n.drag * v[i]) * (h / n.mass);
         x[i] += h * v[i];
@@ -640,7 +646,7 @@ TEST(ModelSafeStep, SemiImplicitEulerStaysBoundedBelowItAndNotFarAbove) {
     }
     return energy;
   };
-  const double h = safe_step(model);
+  const double h = model::safe_step(model);
   EXPECT_GT(h, 1e-4); // sane for the default material at a 20 mm ball
   EXPECT_LT(energy_after(0.99 * h, 3000), 1e-3);
   EXPECT_FALSE(energy_after(4 * h, 3000) <
@@ -650,116 +656,118 @@ TEST(ModelSafeStep, SemiImplicitEulerStaysBoundedBelowItAndNotFarAbove) {
 // ---- invariants
 
 TEST(ModelCheck, EachInvariantIsGuarded) {
-  BuildOptions options;
+  model::BuildOptions options;
   options.bend = true;
   options.normals = true;
   TriangleMesh mesh = octahedron();
   mesh.texcoords.resize(8);
-  const Model good = build(mesh, options).model;
-  ASSERT_EQ(complaint(good), "");
+  const model::Model good = build(mesh, options).model;
+  ASSERT_EQ(model_complaint(good), "");
   const auto broken = [&](auto&& change) {
-    Model model = good;
+    gewebe::model::Model model = good;
     change(model);
-    return complaint(model);
+    return model_complaint(model);
   };
   const auto expect = [&](const std::string& words, auto&& change) {
     const std::string text = broken(change);
     EXPECT_NE(text.find(words), std::string::npos) << "'" << text << "' lacks '" << words << "'";
     EXPECT_NE(text.find("expected"), std::string::npos) << text;
   };
-  const std::size_t central = surface_count(good);
-  expect("0 materials", [](Model& m) { m.materials.clear(); });
-  expect("0 nodes", [](Model& m) { m.nodes.clear(); });
-  expect("quote", [](Model& m) { m.name = "a\"b"; });
-  expect("control", [](Model& m) { m.materials[0].name = "a\nb"; });
-  expect("density", [](Model& m) { m.materials[0].density = 0; });
-  expect("young", [](Model& m) { m.materials[0].young = -1; });
-  expect("thickness", [](Model& m) { m.materials[0].thickness = NAN; });
-  expect("damping ratio", [](Model& m) { m.materials[0].damping_ratio = INFINITY; });
-  expect("node 3: coordinate", [](Model& m) { m.nodes[3].position.y = NAN; });
-  expect("mass", [](Model& m) { m.nodes[0].mass = -1; });
-  expect("drag", [](Model& m) { m.nodes[0].drag = NAN; });
-  expect("axes", [](Model& m) { m.nodes[0].fixed = 8; });
-  expect("material 1", [](Model& m) { m.nodes[0].material = 1; });
-  expect("central 999", [](Model& m) { m.nodes[0].central = 999; });
-  expect("central -2", [](Model& m) { m.nodes[0].central = -2; });
-  expect("is central or behind", [](Model& m) { m.nodes[0].central = 1; });
-  expect("no central node", [](Model& m) { m.nodes[1].central = 0; });
-  expect("belongs to no node", [](Model& m) { m.nodes.emplace_back(); });
-  expect("normals", [](Model& m) { m.normals.pop_back(); });
-  expect("normal 2", [](Model& m) { m.normals[2].z = NAN; });
-  expect("spring 0: node 99", [](Model& m) { m.springs[0].j = 99; });
-  expect("smaller node first", [](Model& m) { std::swap(m.springs[0].i, m.springs[0].j); });
-  expect("smaller node first", [](Model& m) { m.springs[0].i = m.springs[0].j; });
-  expect("stiffness", [](Model& m) { m.springs[5].stiffness = -1; });
-  expect("damping", [](Model& m) { m.springs[5].damping = NAN; });
-  expect("rest", [](Model& m) { m.springs[5].rest = -1e-9; });
-  expect("coincide",
-         [](Model& m) { m.nodes[m.springs[0].i].position = m.nodes[m.springs[0].j].position; });
-  expect("stands twice", [](Model& m) { m.springs[1] = m.springs[0]; });
-  expect("stands behind", [](Model& m) { std::swap(m.springs[0], m.springs[1]); });
-  expect("stands behind", [](Model& m) { std::swap(m.springs.front(), m.springs.back()); });
-  expect("kind e and of kind b", [](Model& m) {
+  const std::size_t central = model::surface_count(good);
+  expect("0 materials", [](model::Model& m) { m.materials.clear(); });
+  expect("0 nodes", [](model::Model& m) { m.nodes.clear(); });
+  expect("quote", [](model::Model& m) { m.name = "a\"b"; });
+  expect("control", [](model::Model& m) { m.materials[0].name = "a\nb"; });
+  expect("density", [](model::Model& m) { m.materials[0].density = 0; });
+  expect("young", [](model::Model& m) { m.materials[0].young = -1; });
+  expect("thickness", [](model::Model& m) { m.materials[0].thickness = NAN; });
+  expect("damping ratio", [](model::Model& m) { m.materials[0].damping_ratio = INFINITY; });
+  expect("node 3: coordinate", [](model::Model& m) { m.nodes[3].position.y = NAN; });
+  expect("mass", [](model::Model& m) { m.nodes[0].mass = -1; });
+  expect("drag", [](model::Model& m) { m.nodes[0].drag = NAN; });
+  expect("axes", [](model::Model& m) { m.nodes[0].fixed = 8; });
+  expect("material 1", [](model::Model& m) { m.nodes[0].material = 1; });
+  expect("central 999", [](model::Model& m) { m.nodes[0].central = 999; });
+  expect("central -2", [](model::Model& m) { m.nodes[0].central = -2; });
+  expect("is central or behind", [](model::Model& m) { m.nodes[0].central = 1; });
+  expect("no central node", [](model::Model& m) { m.nodes[1].central = 0; });
+  expect("belongs to no node", [](model::Model& m) { m.nodes.emplace_back(); });
+  expect("normals", [](model::Model& m) { m.normals.pop_back(); });
+  expect("normal 2", [](model::Model& m) { m.normals[2].z = NAN; });
+  expect("spring 0: node 99", [](model::Model& m) { m.springs[0].j = 99; });
+  expect("smaller node first", [](model::Model& m) { std::swap(m.springs[0].i, m.springs[0].j); });
+  expect("smaller node first", [](model::Model& m) { m.springs[0].i = m.springs[0].j; });
+  expect("stiffness", [](model::Model& m) { m.springs[5].stiffness = -1; });
+  expect("damping", [](model::Model& m) { m.springs[5].damping = NAN; });
+  expect("rest", [](model::Model& m) { m.springs[5].rest = -1e-9; });
+  expect("coincide", [](model::Model& m) {
+    m.nodes[m.springs[0].i].position = m.nodes[m.springs[0].j].position;
+  });
+  expect("stands twice", [](model::Model& m) { m.springs[1] = m.springs[0]; });
+  expect("stands behind", [](model::Model& m) { std::swap(m.springs[0], m.springs[1]); });
+  expect("stands behind", [](model::Model& m) { std::swap(m.springs.front(), m.springs.back()); });
+  expect("kind e and of kind b", [](model::Model& m) {
     m.springs[12].i = m.springs[0].i;
     m.springs[12].j = m.springs[0].j;
   });
-  expect("its central node", [](Model& m) {
+  expect("its central node", [](model::Model& m) {
     m.springs.back().i = 0;
     m.springs.back().j = 5;
   });
-  expect("ends at a central node", [](Model& m) { m.springs.back().kind = SpringKind::bend; });
-  expect("triangle 1: node 99", [](Model& m) { m.triangles[1][0] = 99; });
-  expect("stands twice", [](Model& m) { m.triangles[1][0] = m.triangles[1][1]; });
+  expect("ends at a central node",
+         [](model::Model& m) { m.springs.back().kind = model::SpringKind::bend; });
+  expect("triangle 1: node 99", [](model::Model& m) { m.triangles[1][0] = 99; });
+  expect("stands twice", [](model::Model& m) { m.triangles[1][0] = m.triangles[1][1]; });
   expect("central node",
-         [&](Model& m) { m.triangles[1][0] = static_cast<std::uint32_t>(central); });
-  expect("texcoords", [](Model& m) { m.texcoords.pop_back(); });
-  expect("texture", [](Model& m) { m.texcoords[7][5] = NAN; });
-  expect("tetrahedron 0", [](Model& m) {
+         [&](model::Model& m) { m.triangles[1][0] = static_cast<std::uint32_t>(central); });
+  expect("texcoords", [](model::Model& m) { m.texcoords.pop_back(); });
+  expect("texture", [](model::Model& m) { m.texcoords[7][5] = NAN; });
+  expect("tetrahedron 0", [](model::Model& m) {
     m.tetrahedra = {{0, 1, 2, 2}};
     m.tetrahedron_material = {0};
   });
-  expect("0 materials of tetrahedra", [](Model& m) { m.tetrahedra = {{0, 1, 2, 3}}; });
-  expect("middles", [](Model& m) { m.middles.resize(1); });
-  expect("Poisson's ratio", [](Model& m) { m.materials[0].poisson = 0.5; });
-  expect("Poisson's ratio", [](Model& m) { m.materials[0].poisson = NAN; });
+  expect("0 materials of tetrahedra", [](model::Model& m) { m.tetrahedra = {{0, 1, 2, 3}}; });
+  expect("middles", [](model::Model& m) { m.middles.resize(1); });
+  expect("Poisson's ratio", [](model::Model& m) { m.materials[0].poisson = 0.5; });
+  expect("Poisson's ratio", [](model::Model& m) { m.materials[0].poisson = NAN; });
 }
 
 TEST(ModelDigest, SeesEveryField) {
   TriangleMesh mesh = octahedron();
   mesh.texcoords.resize(8);
-  const Model good = build(mesh).model;
-  std::set<std::string> digests{model_digest(good)};
+  const model::Model good = build(mesh).model;
+  std::set<std::string> digests{model::model_digest(good)};
   std::size_t count = 1;
   const auto change = [&](auto&& edit) {
-    Model m = good;
+    gewebe::model::Model m = good;
     edit(m);
-    digests.insert(model_digest(m));
+    digests.insert(gewebe::model::model_digest(m));
     EXPECT_EQ(digests.size(), ++count);
   };
-  EXPECT_EQ(model_digest(good), *digests.begin());
-  change([](Model& m) { m.name = "x"; });
-  change([](Model& m) { m.materials[0].young += 1; });
-  change([](Model& m) { m.nodes[1].position.z = 1e-300; });
-  change([](Model& m) { m.nodes[1].fixed = 2; });
-  change([](Model& m) { m.nodes[1].drag = 2; });
-  change([](Model& m) { m.normals.resize(m.nodes.size()); });
-  change([](Model& m) { m.springs[2].rest *= 1.0000001; });
-  change([](Model& m) { std::swap(m.triangles[0], m.triangles[1]); });
-  change([](Model& m) { m.texcoords[0][0] = 1; });
-  const auto element = [](Model& m) {
+  EXPECT_EQ(model::model_digest(good), *digests.begin());
+  change([](model::Model& m) { m.name = "x"; });
+  change([](model::Model& m) { m.materials[0].young += 1; });
+  change([](model::Model& m) { m.nodes[1].position.z = 1e-300; });
+  change([](model::Model& m) { m.nodes[1].fixed = 2; });
+  change([](model::Model& m) { m.nodes[1].drag = 2; });
+  change([](model::Model& m) { m.normals.resize(m.nodes.size()); });
+  change([](model::Model& m) { m.springs[2].rest *= 1.0000001; });
+  change([](model::Model& m) { std::swap(m.triangles[0], m.triangles[1]); });
+  change([](model::Model& m) { m.texcoords[0][0] = 1; });
+  const auto element = [](model::Model& m) {
     m.tetrahedra = {{0, 1, 2, 3}};
     m.tetrahedron_material = {0};
   };
   change(element);
-  change([&](Model& m) {
+  change([&](model::Model& m) {
     element(m);
     m.tetrahedron_material = {1};
   });
-  change([&](Model& m) {
+  change([&](model::Model& m) {
     element(m);
     m.materials[0].poisson = 0.3;
   });
-  change([&](Model& m) {
+  change([&](model::Model& m) {
     element(m);
     m.middles = {{4, 5, 6, 7, 8, 9}};
   });
@@ -815,7 +823,7 @@ TEST(ModelOrgans, CountsEqualAnIndependentCount) {
         Case{"hubmap_F_spleen_uv.obj", 4274, 12816},
         Case{"ts_liver_gallbladder_portal.obj", 15673, 47037}}) {
     const TriangleMesh mesh = read_obj(data + c.file);
-    const BuiltModel built = build(mesh);
+    const model::BuiltModel built = build(mesh);
     std::vector<std::pair<std::uint32_t, std::uint32_t>> pairs;
     for (const Triangle& t : mesh.triangles)
       for (std::size_t k = 0; k < 3; ++k)
@@ -823,13 +831,13 @@ TEST(ModelOrgans, CountsEqualAnIndependentCount) {
           pairs.push_back(std::minmax(t[k], t[(k + 1) % 3]));
     std::sort(pairs.begin(), pairs.end());
     pairs.erase(std::unique(pairs.begin(), pairs.end()), pairs.end());
-    EXPECT_EQ(surface_count(built.model), c.points) << c.file;
-    EXPECT_EQ(spring_count(built.model, SpringKind::edge), c.edges) << c.file;
+    EXPECT_EQ(model::surface_count(built.model), c.points) << c.file;
+    EXPECT_EQ(model::spring_count(built.model, model::SpringKind::edge), c.edges) << c.file;
     EXPECT_EQ(pairs.size(), c.edges) << c.file;
-    EXPECT_GT(safe_step(built.model), 0);
-    EXPECT_EQ(complaint(built.model), "");
+    EXPECT_GT(model::safe_step(built.model), 0);
+    EXPECT_EQ(model_complaint(built.model), "");
   }
 }
 
 } // namespace
-} // namespace gewebe
+} // namespace gewebe::test

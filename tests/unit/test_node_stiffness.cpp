@@ -21,26 +21,26 @@
 #include <utility>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::test {
 namespace {
 
-Model block(bool quadratic, std::uint32_t cells = 6) {
-  SolidModelOptions options;
+model::Model block(bool quadratic, std::uint32_t cells = 6) {
+  fem::SolidModelOptions options;
   options.material.materials = {{"gel", 1e-3, 20000, 1, 0.2, 0.45}};
   options.quadratic = quadratic;
-  Model model = solid_model(test::box_tetrahedra(cells, cells, cells, 2), options, {});
+  model::Model model = fem::solid_model(test::box_tetrahedra(cells, cells, cells, 2), options, {});
   for (std::uint32_t i = 0; i < model.nodes.size(); ++i) {
     const Vec3& p = model.nodes[i].position;
-    model.nodes[i].fixed = p.x == 0                          ? fixed_all
-                           : p.x < 5 && p.y == 0 && p.z == 0 ? fixed_y
-                                                             : fixed_none;
+    model.nodes[i].fixed = p.x == 0                          ? model::fixed_all
+                           : p.x < 5 && p.y == 0 && p.z == 0 ? model::fixed_y
+                                                             : model::fixed_none;
   }
   return model;
 }
 
 /// The same numbers as in the matrix by rows.
-void expect_like(const NodeMatrix& matrix, const Model& model, double tolerance) {
-  const StiffnessMatrix k = stiffness_matrix(model);
+void expect_like(const linalg::NodeMatrix& matrix, const model::Model& model, double tolerance) {
+  const linalg::StiffnessMatrix k = fem::stiffness_matrix(model);
   ASSERT_EQ(matrix.nodes(), model.nodes.size());
   constexpr std::array<std::array<std::size_t, 3>, 3> entry{{{0, 1, 2}, {1, 3, 4}, {2, 4, 5}}};
   double largest = 0, worst = 0;
@@ -70,27 +70,28 @@ void expect_like(const NodeMatrix& matrix, const Model& model, double tolerance)
   EXPECT_LE(worst, tolerance * largest);
 }
 
-std::optional<CutModel> cut_at(const Model& model, const Vec3& place, const Vec3& normal,
-                               double radius) {
+std::optional<cutting::CutModel> cut_at(const model::Model& model, const Vec3& place,
+                                        const Vec3& normal, double radius) {
   std::vector<std::uint8_t> among(model.nodes.size());
   for (std::size_t i = 0; i < among.size(); ++i)
     among[i] = norm(model.nodes[i].position - place) <= radius;
-  BladeCutOptions options;
+  incision::BladeCutOptions options;
   options.among = among;
-  SolidCut cut = cut_solid(model, plane_blade(model, {place, normal}), options);
+  cutting::SolidCut cut =
+      cutting::cut_solid(model, cutting::plane_blade(model, {place, normal}), options);
   if (cut.report.doubled == 0)
     return std::nullopt;
-  return as_cut_model(model, std::move(cut));
+  return cutting::as_cut_model(model, std::move(cut));
 }
 
-double error_of(const CutStiffness& stiffness, const Model& model) {
+double error_of(const update::CutStiffness& stiffness, const model::Model& model) {
   std::vector<double> is(3 * model.nodes.size());
   for (std::size_t k = 0; k < is.size(); ++k)
     is[k] = static_cast<double>(k * 7 % 23) - 11;
   const std::vector<double> load = is;
   stiffness.compliance()->solve(is, 1);
-  const StiffnessMatrix matrix = stiffness_matrix(model);
-  const Factor factor(matrix, {});
+  const linalg::StiffnessMatrix matrix = fem::stiffness_matrix(model);
+  const linalg::Factor factor(matrix, {});
   std::vector<double> f, u(matrix.order());
   for (const std::int64_t axis : matrix.axis_of_row)
     f.push_back(load[static_cast<std::size_t>(axis)]);
@@ -108,14 +109,14 @@ class NodeStiffness : public testing::TestWithParam<bool> {};
 INSTANTIATE_TEST_SUITE_P(Orders, NodeStiffness, testing::Bool());
 
 TEST_P(NodeStiffness, IsThatOfTheElements) {
-  const Model model = block(GetParam(), 4);
-  expect_like(node_stiffness(model), model, 1e-15);
+  const model::Model model = block(GetParam(), 4);
+  expect_like(update::node_stiffness(model), model, 1e-15);
 }
 
 TEST_P(NodeStiffness, ItsNormIsThatOfTheRowsAndNoNumberWhereOneIsNone) {
-  const Model model = block(GetParam(), 4);
-  NodeMatrix matrix = node_stiffness(model);
-  const StiffnessMatrix k = stiffness_matrix(model);
+  const model::Model model = block(GetParam(), 4);
+  linalg::NodeMatrix matrix = update::node_stiffness(model);
+  const linalg::StiffnessMatrix k = fem::stiffness_matrix(model);
   std::vector<double> sums(3 * model.nodes.size());
   for (std::size_t c = 0; c < k.order(); ++c)
     for (auto at = static_cast<std::size_t>(k.column_start[c]);
@@ -127,33 +128,34 @@ TEST_P(NodeStiffness, ItsNormIsThatOfTheRowsAndNoNumberWhereOneIsNone) {
     }
   for (std::size_t i = 0; i < matrix.nodes(); ++i) {
     const double most = std::max({sums[3 * i], sums[3 * i + 1], sums[3 * i + 2]});
-    ASSERT_NEAR(row_norm(matrix, i), most, 1e-13 * most) << i;
+    ASSERT_NEAR(update::row_norm(matrix, i), most, 1e-13 * most) << i;
   }
   std::size_t last = 0;
   for (std::size_t i = 0; i < matrix.nodes(); ++i)
-    if (matrix.fixed[i] == fixed_none)
+    if (matrix.fixed[i] == model::fixed_none)
       last = i;
   for (const std::size_t entry : {0U, 3U, 5U}) { // of one axis alone
-    NodeMatrix spoilt = matrix;
+    linalg::NodeMatrix spoilt = matrix;
     spoilt.diagonal[last][entry] = std::nan("");
-    EXPECT_TRUE(std::isnan(row_norm(spoilt, last))) << entry;
+    EXPECT_TRUE(std::isnan(update::row_norm(spoilt, last))) << entry;
   }
 }
 
 TEST_P(NodeStiffness, FollowsCuts) {
-  Model model = block(GetParam(), 4);
-  NodeMatrix matrix = node_stiffness(model);
+  model::Model model = block(GetParam(), 4);
+  linalg::NodeMatrix matrix = update::node_stiffness(model);
   std::size_t cuts = 0;
   for (int k = 0; k < 6; ++k) {
-    std::optional<CutModel> cut = cut_at(model, {3.1 + k, 8, 8 - 0.7 * k}, {1, 0.3 * k, 0.5}, 4.5);
+    std::optional<cutting::CutModel> cut =
+        cut_at(model, {3.1 + k, 8, 8 - 0.7 * k}, {1, 0.3 * k, 0.5}, 4.5);
     if (!cut)
       continue;
     ++cuts;
-    const std::vector<std::uint32_t> rows = changed_rows(model, cut->model, cut->place);
+    const std::vector<std::uint32_t> rows = update::changed_rows(model, cut->model, cut->place);
     EXPECT_LT(rows.size(), cut->model.nodes.size() * 2 / 3);
-    update_node_stiffness(matrix, cut->model, rows);
+    update::update_node_stiffness(matrix, cut->model, rows);
     model = std::move(cut->model);
-    const NodeMatrix fresh = node_stiffness(model);
+    const linalg::NodeMatrix fresh = update::node_stiffness(model);
     EXPECT_EQ(matrix.start, fresh.start);
     EXPECT_EQ(matrix.node, fresh.node);
     EXPECT_EQ(matrix.diagonal, fresh.diagonal);
@@ -167,21 +169,22 @@ TEST_P(NodeStiffness, FollowsCuts) {
 }
 
 TEST_P(NodeStiffness, ItsFactorFollowsCutsInPart) {
-  auto model = std::make_shared<const Model>(block(GetParam(), GetParam() ? 4 : 8));
-  CutStiffness stiffness(model, nullptr, {});
+  auto model = std::make_shared<const model::Model>(block(GetParam(), GetParam() ? 4 : 8));
+  update::CutStiffness stiffness(model, nullptr, {});
   const double size = GetParam() ? 8 : 16;
   std::size_t in_part = 0, cuts = 0;
   for (int k = 0; k < 12; ++k) {
     const double x = 2.6 + (size - 4) * (k * 5 % 12) / 12, y = size * (k * 7 % 12) / 12;
-    std::optional<CutModel> cut = cut_at(*model, {x, y, size - 0.1}, {1, 0.2 * k - 1, 0.4}, 4.2);
-    if (!cut || !free_parts(*model, *cut).parts.empty())
+    std::optional<cutting::CutModel> cut =
+        cut_at(*model, {x, y, size - 0.1}, {1, 0.2 * k - 1, 0.4}, 4.2);
+    if (!cut || !cutting::free_parts(*model, *cut).parts.empty())
       continue;
-    auto next = std::make_shared<const Model>(cut->model);
-    const CutWork work = stiffness.cut(next, cut->origin, cut->place);
-    in_part +=
-        work.way == CutWay::refactor && work.factor.operations < 0.95 * work.factor.all_operations
-            ? 1
-            : 0;
+    auto next = std::make_shared<const model::Model>(cut->model);
+    const update::CutWork work = stiffness.cut(next, cut->origin, cut->place);
+    in_part += work.way == update::CutWay::refactor &&
+                       work.factor.operations < 0.95 * work.factor.all_operations
+                   ? 1
+                   : 0;
     ++cuts;
     model = next;
     EXPECT_LT(error_of(stiffness, *model), 1e-10);
@@ -191,20 +194,21 @@ TEST_P(NodeStiffness, ItsFactorFollowsCutsInPart) {
 }
 
 TEST_P(NodeStiffness, ANewOrderIsCheaperThanTheOneThatIsWornOut) {
-  auto model = std::make_shared<const Model>(block(GetParam(), GetParam() ? 4 : 8));
-  CutStiffness stiffness(model, nullptr, {});
+  auto model = std::make_shared<const model::Model>(block(GetParam(), GetParam() ? 4 : 8));
+  update::CutStiffness stiffness(model, nullptr, {});
   stiffness.prepare();
   const double size = GetParam() ? 8 : 16;
   double before = 0; // operations of a whole factor
   for (int k = 0; k < 400; ++k) {
     const double x = 3 + (size - 5) * (k * 5 % 13) / 13, y = size * (k * 7 % 17) / 17,
                  z = size * (k * 3 % 11) / 11;
-    std::optional<CutModel> cut = cut_at(*model, {x, y, z}, {1, 0.2 * (k % 9) - 1, 0.4}, 4.2);
-    if (!cut || !free_parts(*model, *cut).parts.empty())
+    std::optional<cutting::CutModel> cut =
+        cut_at(*model, {x, y, z}, {1, 0.2 * (k % 9) - 1, 0.4}, 4.2);
+    if (!cut || !cutting::free_parts(*model, *cut).parts.empty())
       continue;
-    model = std::make_shared<const Model>(cut->model);
-    const CutWork work = stiffness.cut(model, cut->origin, cut->place);
-    if (work.way == CutWay::fresh) {
+    model = std::make_shared<const model::Model>(cut->model);
+    const update::CutWork work = stiffness.cut(model, cut->origin, cut->place);
+    if (work.way == update::CutWay::fresh) {
       EXPECT_GT(before, 0);
       EXPECT_LT(work.factor.all_operations, 0.8 * before);
       return;
@@ -215,38 +219,39 @@ TEST_P(NodeStiffness, ANewOrderIsCheaperThanTheOneThatIsWornOut) {
 }
 
 TEST_P(NodeStiffness, ItsFactorGoesOnWithoutAPiece) {
-  auto model = std::make_shared<const Model>(block(GetParam(), 4));
-  CutStiffness stiffness(model, nullptr, {});
+  auto model = std::make_shared<const model::Model>(block(GetParam(), 4));
+  update::CutStiffness stiffness(model, nullptr, {});
   stiffness.prepare();
-  SolidCut cut = cut_solid(*model, plane_blade(*model, {{5.2, 4, 4}, {1, 0.2, 0.1}}), {});
-  CutModel step = as_cut_model(*model, std::move(cut));
-  FreeParts parts = free_parts(*model, step);
+  cutting::SolidCut cut =
+      cutting::cut_solid(*model, cutting::plane_blade(*model, {{5.2, 4, 4}, {1, 0.2, 0.1}}), {});
+  cutting::CutModel step = cutting::as_cut_model(*model, std::move(cut));
+  cutting::FreeParts parts = cutting::free_parts(*model, step);
   ASSERT_EQ(parts.parts.size(), 1U);
-  step = without_parts(std::move(step), std::move(parts.rest));
-  const auto next = std::make_shared<const Model>(step.model);
+  step = cutting::without_parts(std::move(step), std::move(parts.rest));
+  const auto next = std::make_shared<const model::Model>(step.model);
   (void)stiffness.cut(next, step.origin, step.place);
   EXPECT_LT(error_of(stiffness, *next), 1e-10);
-  std::optional<CutModel> more = cut_at(*next, {2.4, 8, 8}, {1, 0.2, 0.5}, 4.5);
+  std::optional<cutting::CutModel> more = cut_at(*next, {2.4, 8, 8}, {1, 0.2, 0.5}, 4.5);
   ASSERT_TRUE(more.has_value());
-  const auto last = std::make_shared<const Model>(more->model);
+  const auto last = std::make_shared<const model::Model>(more->model);
   (void)stiffness.cut(last, more->origin, more->place);
   EXPECT_LT(error_of(stiffness, *last), 1e-10);
 }
 
 /// Fronts of more rows than one thread is left alone with, computed again after a cut.
 TEST(LargeFronts, FollowACutToTheSameBitsOnAnyThreads) {
-  const auto model = std::make_shared<const Model>(block(false, 17));
-  const std::optional<CutModel> cut = cut_at(*model, {17, 17, 17}, {1, 0.2, 0.1}, 4.5);
+  const auto model = std::make_shared<const model::Model>(block(false, 17));
+  const std::optional<cutting::CutModel> cut = cut_at(*model, {17, 17, 17}, {1, 0.2, 0.1}, 4.5);
   ASSERT_TRUE(cut.has_value());
-  const auto now = std::make_shared<const Model>(cut->model);
+  const auto now = std::make_shared<const model::Model>(cut->model);
   std::vector<double> first;
   for (const int threads : {1, 2, 3}) {
     Context context;
     context.threads = threads;
-    CutStiffness stiffness(model, nullptr, context);
+    update::CutStiffness stiffness(model, nullptr, context);
     stiffness.prepare();
-    const CutWork work = stiffness.cut(now, cut->origin, cut->place);
-    EXPECT_EQ(work.way, CutWay::refactor);
+    const update::CutWork work = stiffness.cut(now, cut->origin, cut->place);
+    EXPECT_EQ(work.way, update::CutWay::refactor);
     EXPECT_GT(work.factor.operations, 2e8);
     std::vector<double> u(3 * now->nodes.size());
     for (std::size_t k = 0; k < u.size(); ++k)
@@ -259,4 +264,4 @@ TEST(LargeFronts, FollowACutToTheSameBitsOnAnyThreads) {
 }
 
 } // namespace
-} // namespace gewebe
+} // namespace gewebe::test

@@ -13,27 +13,27 @@
 #include <numbers>
 #include <random>
 
-namespace gewebe {
+namespace gewebe::test {
 namespace {
 
 std::vector<float> openness_of(const TriangleMesh& mesh, const std::vector<Vec3>& normals,
                                double radius, unsigned threads = 0) {
-  const std::vector<Occluder> one{{mesh.points, normals, mesh.triangles}};
+  const std::vector<shading::Occluder> one{{mesh.points, normals, mesh.triangles}};
   Context context;
   context.threads = static_cast<int>(threads);
-  return openness(one, radius, context)[0];
+  return shading::openness(one, radius, context)[0];
 }
 
 TEST(Occlusion, NothingHidesAConvexBody) {
   const TriangleMesh ball = test::sphere_mesh(3, 30, {100, -20, 7});
-  for (const float open : openness_of(ball, render_normals(ball), 100))
+  for (const float open : openness_of(ball, shading::render_normals(ball), 100))
     EXPECT_EQ(open, 1.0F);
 }
 
 // From e above the inside of a sphere a ray at the angle a from the normal, cos a = c, runs
 // (r - e) c + √(r² - (r - e)² (1 - c²)); with e = 0 and a large radius the openness were 4 r / 3 R.
 double inside_a_sphere(double r, double radius) {
-  const double below = r - occlusion_lift * radius;
+  const double below = r - shading::occlusion_lift * radius;
   constexpr int steps = 20000;
   double open = 0;
   for (int n = 0; n < steps; ++n) {
@@ -48,7 +48,7 @@ double inside_a_sphere(double r, double radius) {
 TEST(Occlusion, InsideASphere) {
   const double r = 30;
   const TriangleMesh ball = test::sphere_mesh(4, r, {5, 6, 7});
-  std::vector<Vec3> inwards = render_normals(ball);
+  std::vector<Vec3> inwards = shading::render_normals(ball);
   for (Vec3& n : inwards)
     n = n * -1.0;
   EXPECT_NEAR(inside_a_sphere(r, 3 * r), 4.0 / 9, 0.02);
@@ -164,10 +164,10 @@ TEST(Occlusion, AsRaysCountedOneByOne) {
 TEST(Occlusion, OneSurfaceHidesAnother) {
   const TriangleMesh ball = test::sphere_mesh(3, 10, {});
   const TriangleMesh other = test::sphere_mesh(3, 10, {0, 0, 21});
-  const std::vector<Vec3> a = render_normals(ball), b = render_normals(other);
-  const std::vector<Occluder> both{{ball.points, a, ball.triangles},
-                                   {other.points, b, other.triangles}};
-  const auto found = openness(both, 10, {});
+  const std::vector<Vec3> a = shading::render_normals(ball), b = shading::render_normals(other);
+  const std::vector<shading::Occluder> both{{ball.points, a, ball.triangles},
+                                            {other.points, b, other.triangles}};
+  const auto found = shading::openness(both, 10, {});
   const auto top = std::ranges::max_element(ball.points, {}, [](const Vec3& p) { return p.z; });
   const auto low = std::ranges::min_element(ball.points, {}, [](const Vec3& p) { return p.z; });
   EXPECT_LT(found[0][static_cast<std::size_t>(top - ball.points.begin())], 0.4F);
@@ -197,24 +197,25 @@ TEST(Occlusion, PointsWithoutNormalOrTriangleAndNoRadius) {
 
 // A vertex is darkened by its share, and stays so while the view alone changes.
 TEST(Occlusion, DarkensVertices) {
-  std::vector<Surface> surfaces(2);
+  std::vector<shading::Surface> surfaces(2);
   surfaces[0].mesh = test::sphere_mesh(2, 10, {});
   surfaces[1].mesh = test::sphere_mesh(2, 10, {0, 0, 21});
-  DrawingOptions options;
+  shading::DrawingOptions options;
   options.shade = 0.5;
   options.light = {100, 0, 0};
-  options.camera = make_camera({}, rest_box(surfaces), 32, 32);
-  const Drawing open = make_drawing(surfaces, options, {});
+  options.camera = shading::make_camera({}, shading::rest_box(surfaces), 32, 32);
+  const shading::Drawing open = shading::make_drawing(surfaces, options, {});
   options.occlusion = 0.8;
   options.occlusion_radius = 10;
-  DrawingMaker maker;
-  (void)maker.make(surfaces, options, DrawingChange::all, {});
-  const Drawing& hidden = maker.make(surfaces, options, DrawingChange::view, {});
-  const std::vector<Vec3> a = render_normals(surfaces[0].mesh),
-                          b = render_normals(surfaces[1].mesh);
-  const std::vector<Occluder> both{{surfaces[0].mesh.points, a, surfaces[0].mesh.triangles},
-                                   {surfaces[1].mesh.points, b, surfaces[1].mesh.triangles}};
-  const auto found = openness(both, 10, {});
+  shading::DrawingMaker maker;
+  (void)maker.make(surfaces, options, shading::DrawingChange::all, {});
+  const shading::Drawing& hidden = maker.make(surfaces, options, shading::DrawingChange::view, {});
+  const std::vector<Vec3> a = shading::render_normals(surfaces[0].mesh),
+                          b = shading::render_normals(surfaces[1].mesh);
+  const std::vector<shading::Occluder> both{
+      {surfaces[0].mesh.points, a, surfaces[0].mesh.triangles},
+      {surfaces[1].mesh.points, b, surfaces[1].mesh.triangles}};
+  const auto found = shading::openness(both, 10, {});
   const std::size_t first = found[0].size();
   ASSERT_EQ(hidden.vertices.size(), open.vertices.size());
   for (std::size_t v = 0; v < hidden.vertices.size(); ++v) {
@@ -225,4 +226,4 @@ TEST(Occlusion, DarkensVertices) {
 }
 
 } // namespace
-} // namespace gewebe
+} // namespace gewebe::test

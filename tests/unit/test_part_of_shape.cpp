@@ -24,7 +24,7 @@
 #include <utility>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::test {
 namespace {
 
 using test::organ;
@@ -34,42 +34,43 @@ const Vec3 middle{100, -50, 30};
 
 /// An organ of which all nodes of the surface have compressed columns.
 struct StoredOrgan {
-  Model model = organ(4);
-  StiffnessMatrix k = stiffness_matrix(model);
-  CompressedMade made;
+  model::Model model = organ(4);
+  linalg::StiffnessMatrix k = fem::stiffness_matrix(model);
+  columns::CompressedMade made;
   bool broken = false; ///< the file
 
   StoredOrgan() {
-    const Factor factor(k, {});
+    const linalg::Factor factor(k, {});
     std::vector<Vec3> positions;
     std::vector<std::uint32_t> nodes;
     for (std::uint32_t i = 0; i < model.nodes.size(); ++i) {
       positions.push_back(model.nodes[i].position);
-      if (i < surface_count(model))
+      if (i < model::surface_count(model))
         nodes.push_back(i);
     }
-    made = compress_columns(positions, nodes, 1e-5,
-                            [&](std::span<const std::uint32_t> of, ColumnSink& sink) {
-                              return compliance_columns(k, factor, stiffness_norm(k), of, {}, sink,
-                                                        positions.size());
-                            },
-                            {});
+    made = columns::compress_columns(
+        positions, nodes, 1e-5,
+        [&](std::span<const std::uint32_t> of, columns::ColumnSink& sink) {
+          return columns::compliance_columns(k, factor, linalg::stiffness_norm(k), of, {}, sink,
+                                             positions.size());
+        },
+        {});
   }
-  void join(Simulation& s) const {
-    ObjectSource source;
+  void join(scene::Simulation& s) const {
+    scene::ObjectSource source;
     source.model = [this] { return model; };
-    source.stiffness = [this](const Model&) { return stiffness(); };
-    s.add_object("organ", std::move(source), Method::ffe);
+    source.stiffness = [this](const model::Model&) { return stiffness(); };
+    s.add_object("organ", std::move(source), scene::Method::ffe);
   }
-  std::shared_ptr<ComplianceSource> stiffness() const {
+  std::shared_ptr<compliance::ComplianceSource> stiffness() const {
     const auto read = [this](std::size_t chunk) {
       if (broken)
         throw Error("a chunk can't be read");
       return made.chunks[chunk];
     };
-    return compliance_of_store(
-        {std::make_unique<CompressedColumns>(made.layout, model.nodes.size(), read),
-         [this] { return Factor(k, Context{}); }});
+    return compliance::compliance_of_store(
+        {std::make_unique<columns::CompressedColumns>(made.layout, model.nodes.size(), read),
+         [this] { return linalg::Factor(k, Context{}); }});
   }
 };
 
@@ -82,24 +83,24 @@ Context of_threads(int threads) {
 /// Two spheres over the organ, with forces that change in between. \param ask of what is asked in
 /// each step
 std::vector<double> told_on_the_way(const StoredOrgan& organ, int threads, int ask) {
-  Simulation s(of_threads(threads), {.guard = true});
+  scene::Simulation s(of_threads(threads), {.guard = true});
   organ.join(s);
-  s.apply(SetInstrument{0, {1.5, {}, 0}, {middle + Vec3{0, 0, 26}, {}}, "probe"});
-  s.apply(SetInstrument{1, {1, {}, 0}, {middle + Vec3{0, 25, 0}, {}}, "other"});
+  s.apply(scene::SetInstrument{0, {1.5, {}, 0}, {middle + Vec3{0, 0, 26}, {}}, "probe"});
+  s.apply(scene::SetInstrument{1, {1, {}, 0}, {middle + Vec3{0, 25, 0}, {}}, "other"});
   std::vector<double> all;
   for (int step = 0; step < 60; ++step) {
     // To where nothing was looked at, but not to fixed nodes, at the lower end.
     const double a = step < 25 ? 0.02 * step : 1.9 * std::sin(0.23 * step);
     const double deep = step == 0 ? 3 : step % 20 == 19 ? -1 : 0.6 + 0.3 * std::sin(a);
-    s.apply(
-        MoveInstrument{0, middle + (21.5 - deep) * Vec3{std::sin(a), 0.1, std::cos(a)}, {}, 0.001});
-    s.apply(MoveInstrument{1, middle + Vec3{0.3 * a, 20.5, 0.2}, {}, 0.001});
+    s.apply(scene::MoveInstrument{
+        0, middle + (21.5 - deep) * Vec3{std::sin(a), 0.1, std::cos(a)}, {}, 0.001});
+    s.apply(scene::MoveInstrument{1, middle + Vec3{0.3 * a, 20.5, 0.2}, {}, 0.001});
     if (step == 33)
-      s.apply(SetForce{0, {10}, {3, 0, 0}, 0});
+      s.apply(scene::SetForce{0, {10}, {3, 0, 0}, 0});
     if (step == 44)
-      s.apply(SetGravity{{0, 0, -1000}});
+      s.apply(scene::SetGravity{{0, 0, -1000}});
     s.step(0.001);
-    for (const NodeVector& f : s.contact_forces(0))
+    for (const contact::NodeVector& f : s.contact_forces(0))
       all.insert(all.end(), {static_cast<double>(f.node), f.value.x, f.value.y, f.value.z});
     const bool asks = ask == 1 || (ask == 2 && step % 7 == 3);
     if (asks)
@@ -129,23 +130,23 @@ TEST(PartOfShape, AStepThatFailsLeavesItAsItWas) {
   StoredOrgan organ;
   std::vector<std::vector<double>> told;
   for (const bool fails : {false, true}) {
-    Simulation s(of_threads(1), {.guard = true});
+    scene::Simulation s(of_threads(1), {.guard = true});
     organ.join(s);
-    s.apply(SetInstrument{0, {1.5, {}, 0}, {middle + Vec3{-26, 0, 0}, {}}, "probe"});
+    s.apply(scene::SetInstrument{0, {1.5, {}, 0}, {middle + Vec3{-26, 0, 0}, {}}, "probe"});
     std::vector<double>& all = told.emplace_back();
     for (int step = 0; step < 20; ++step) {
       const double deep = step == 0 ? 3 : 0.8;
-      s.apply(MoveInstrument{0,
-                             middle + (21.5 - deep) *
-                                          Vec3{-std::cos(0.15 * step), std::sin(0.15 * step), 0},
-                             {},
-                             0.001});
+      s.apply(scene::MoveInstrument{
+          0,
+          middle + (21.5 - deep) * Vec3{-std::cos(0.15 * step), std::sin(0.15 * step), 0},
+          {},
+          0.001});
       s.step(0.001);
-      for (const NodeVector& f : s.contact_forces(0))
+      for (const contact::NodeVector& f : s.contact_forces(0))
         all.insert(all.end(), {f.value.x, f.value.y, f.value.z});
       if (fails && step % 3 == 2 && step < 12) { // where its columns are not known yet
         organ.broken = true;
-        s.apply(MoveInstrument{0, middle + Vec3{20, 0, 0}, {}, 0.001});
+        s.apply(scene::MoveInstrument{0, middle + Vec3{20, 0, 0}, {}, 0.001});
         EXPECT_THROW(s.step(0.001), Error);
         organ.broken = false;
       }
@@ -157,4 +158,4 @@ TEST(PartOfShape, AStepThatFailsLeavesItAsItWas) {
 }
 
 } // namespace
-} // namespace gewebe
+} // namespace gewebe::test

@@ -46,7 +46,7 @@ void expect_equal(const TriangleMesh& a, const TriangleMesh& b) {
 
 // "PLACE: WHAT" of the complaint, or "" if there is none.
 std::string complaint(const std::string& bytes) {
-  return test::complaint([&] { check_mesh(read_ply(bytes, "m.ply")); });
+  return test::complaint([&] { check_mesh(formats::read_ply(bytes, "m.ply")); });
 }
 
 std::string ascii_square(const std::string& face = "4 0 1 2 3", const std::string& tail = "") {
@@ -74,9 +74,9 @@ void put_big(std::string& bytes, T value) {
 
 TEST(Ply, RoundTripsBitForBit) {
   for (const TriangleMesh& mesh : {tetrahedron(), everything(), TriangleMesh{}}) {
-    const std::string bytes = write_ply(mesh);
-    expect_equal(read_ply(bytes, "m"), mesh);
-    EXPECT_EQ(write_ply(read_ply(bytes, "m")), bytes);
+    const std::string bytes = formats::write_ply(mesh);
+    expect_equal(formats::read_ply(bytes, "m"), mesh);
+    EXPECT_EQ(formats::write_ply(formats::read_ply(bytes, "m")), bytes);
   }
   TriangleMesh other = everything(); // the negative control
   other.points[0].y = 0.0;
@@ -84,7 +84,7 @@ TEST(Ply, RoundTripsBitForBit) {
 }
 
 TEST(Ply, HeaderIsTheDocumentedOne) {
-  const std::string bytes = write_ply(everything());
+  const std::string bytes = formats::write_ply(everything());
   EXPECT_TRUE(
       bytes.starts_with("ply\nformat binary_little_endian 1.0\ncomment gewebe_mesh, millimetres\n"
                         "element vertex 4\nproperty double x\nproperty double y\n"
@@ -101,16 +101,17 @@ TEST(Ply, PiecesAreTheWhole) {
     mesh.points.push_back({double(i), 0, 0});
   std::string joined;
   int pieces = 0;
-  write_ply(mesh, [&](std::string_view piece) {
+  formats::write_ply(mesh, [&](std::string_view piece) {
     joined += piece;
     ++pieces;
   });
   EXPECT_GT(pieces, 2);
-  EXPECT_EQ(joined, write_ply(mesh));
+  EXPECT_EQ(joined, formats::write_ply(mesh));
 }
 
 TEST(Ply, EveryPrefixIsRefused) {
-  std::vector<std::string> files{write_ply(everything()), write_ply(tetrahedron())};
+  std::vector<std::string> files{formats::write_ply(everything()),
+                                 formats::write_ply(tetrahedron())};
   files.push_back(ascii_square());
   files.back().pop_back(); // the last line end may be missing
   for (const std::string& bytes : files) {
@@ -125,7 +126,7 @@ TEST(Ply, EveryPrefixIsRefused) {
 }
 
 TEST(Ply, EveryChangedByteIsAnErrorOrAMesh) {
-  for (const std::string& good : {write_ply(everything()), ascii_square()})
+  for (const std::string& good : {formats::write_ply(everything()), ascii_square()})
     for (std::size_t at = 0; at < good.size(); ++at)
       for (const int value : {0, 1, 9, 10, 45, 57, 127, 128, 255}) {
         std::string bytes = good;
@@ -135,7 +136,7 @@ TEST(Ply, EveryChangedByteIsAnErrorOrAMesh) {
 }
 
 TEST(Ply, SurplusBytesAreRefused) {
-  const std::string bytes = write_ply(tetrahedron());
+  const std::string bytes = formats::write_ply(tetrahedron());
   EXPECT_EQ(complaint(bytes + "x"), "m.ply: byte " + std::to_string(bytes.size()) +
                                         ": 1 bytes after the last element, expected the end");
   EXPECT_EQ(complaint(ascii_square("4 0 1 2 3", " \r\n\n")), "");
@@ -146,20 +147,21 @@ TEST(Ply, SurplusBytesAreRefused) {
 }
 
 TEST(Ply, AsciiWithQuadBecomesTwoTriangles) {
-  PlyStats stats;
-  const TriangleMesh mesh = read_ply(ascii_square(), "m", &stats);
+  formats::PlyStats stats;
+  const TriangleMesh mesh = formats::read_ply(ascii_square(), "m", &stats);
   EXPECT_EQ(mesh.triangles, (std::vector<Triangle>{{0, 1, 2}, {0, 2, 3}}));
   EXPECT_EQ(stats.polygons, 1u);
   EXPECT_EQ(complaint(replaced(ascii_square(), "vertex_indices", "vertex_index")), "");
   std::string crlf;
   for (const char c : ascii_square())
     crlf += c == '\n' ? "\r\n" : std::string(1, c);
-  expect_equal(read_ply(crlf, "m"), mesh);
-  expect_equal(read_ply(replaced(ascii_square(), "1 0 0\n", "\n+1 0.0 -0e5\n\n"), "m"), [&] {
-    TriangleMesh same = mesh;
-    same.points[1].z = -0.0;
-    return same;
-  }());
+  expect_equal(formats::read_ply(crlf, "m"), mesh);
+  expect_equal(formats::read_ply(replaced(ascii_square(), "1 0 0\n", "\n+1 0.0 -0e5\n\n"), "m"),
+               [&] {
+                 TriangleMesh same = mesh;
+                 same.points[1].z = -0.0;
+                 return same;
+               }());
 }
 
 TEST(Ply, BigEndianAndEveryScalarType) {
@@ -189,8 +191,8 @@ TEST(Ply, BigEndianAndEveryScalarType) {
   put_big(bytes, std::int8_t{6});
   for (int i = 0; i < 6; ++i)
     put_big(bytes, i / 4.0);
-  PlyStats stats;
-  const TriangleMesh mesh = read_ply(bytes, "m", &stats);
+  formats::PlyStats stats;
+  const TriangleMesh mesh = formats::read_ply(bytes, "m", &stats);
   EXPECT_EQ(mesh.points,
             (std::vector<Vec3>{{0, 40000, 0}, {-300, 40001, 1}, {-600, 40002, INT32_MIN}}));
   EXPECT_EQ(mesh.triangles, (std::vector<Triangle>{{2, 0, 1}}));
@@ -211,7 +213,7 @@ TEST(Ply, PolygonsKeepTheirAttributes) {
       "4 3 0 1 2 8 3 3 0 0 1 1 2 2 2 6\n" // concave: the reflex corner is 1, opposite to 3
       "3 2 1 4 6 2 0 1 0 4 0 3 7\n"
       "0 -3 0\n-1 0 0\n0 3 0\n-4 0 0\n9 0 0\n"; // faces before vertices
-  const TriangleMesh mesh = read_ply(text, "m");
+  const TriangleMesh mesh = formats::read_ply(text, "m");
   ASSERT_EQ(mesh.triangles.size(), 4u);
   EXPECT_EQ(mesh.part, (std::vector<std::int32_t>{1, 2, 2, 3}));
   EXPECT_EQ(mesh.material, (std::vector<std::int32_t>{5, 6, 6, 7}));
@@ -232,7 +234,7 @@ TEST(Ply, NormalsBecomeUnit) {
   std::string text = "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\n"
                      "property float z\nproperty float nx\nproperty float ny\nproperty float nz\n"
                      "end_header\n0 0 0 0 3 4\n0 0 0 0 0 0\n0 0 0 1.000001 0 0\n";
-  const TriangleMesh mesh = read_ply(text, "m");
+  const TriangleMesh mesh = formats::read_ply(text, "m");
   EXPECT_EQ(mesh.normals[0], (std::array<float, 3>{0, 0.6f, 0.8f}));
   EXPECT_EQ(mesh.normals[1], (std::array<float, 3>{0, 0, 0}));
   EXPECT_EQ(mesh.normals[2][0], 1.000001f);
@@ -242,7 +244,7 @@ TEST(Ply, NormalsBecomeUnit) {
 TEST(Ply, PointsAloneAndNothingAreMeshes) {
   const std::string head = "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\n"
                            "property float y\nproperty float z\nend_header\n";
-  EXPECT_EQ(read_ply(head + "1 2 3", "m").points, (std::vector<Vec3>{{1, 2, 3}}));
+  EXPECT_EQ(formats::read_ply(head + "1 2 3", "m").points, (std::vector<Vec3>{{1, 2, 3}}));
   EXPECT_EQ(complaint(replaced(head, "vertex 1", "vertex 0")), "");
 }
 
@@ -291,7 +293,7 @@ TEST(Ply, BadContentIsNamedWithItsPlace) {
 }
 
 TEST(Ply, CountsBeyondTheBytesAreRefusedBeforeRoomIsTaken) {
-  const std::string good = write_ply(tetrahedron());
+  const std::string good = formats::write_ply(tetrahedron());
   EXPECT_NE(complaint(replaced(good, "vertex 4", "vertex 4000000000")), "");
   EXPECT_NE(complaint(replaced(good, "face 4", "face 4000000000")), "");
   EXPECT_NE(complaint(replaced(good, "face 4", "face 5")), "");

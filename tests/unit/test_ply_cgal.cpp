@@ -17,7 +17,7 @@ using namespace gewebe;
 TEST(PlyCgal, ReadsWhatWeWrite) {
   using Point = CGAL::Simple_cartesian<double>::Point_3;
   const TriangleMesh mesh = test::sphere_mesh(2, 1.0 / 3, {0.1, 1e6, -1e-9});
-  std::istringstream stream(write_ply(mesh));
+  std::istringstream stream(formats::write_ply(mesh));
   std::vector<Point> points;
   std::vector<std::vector<std::size_t>> faces;
   ASSERT_TRUE(CGAL::IO::read_PLY(stream, points, faces));

@@ -14,11 +14,11 @@
 #include <functional>
 #include <random>
 
-namespace gewebe {
+namespace gewebe::test {
 namespace {
 
-Image noise(std::uint32_t width, std::uint32_t height, std::uint32_t channels) {
-  Image image{width, height, channels, {}};
+texture::Image noise(std::uint32_t width, std::uint32_t height, std::uint32_t channels) {
+  texture::Image image{width, height, channels, {}};
   std::mt19937 random(width);
   for (std::size_t n = 0; n < std::size_t{width} * height * channels; ++n)
     image.values.push_back(static_cast<std::uint8_t>(random() >> 24));
@@ -66,65 +66,71 @@ std::string make_png(std::uint32_t width, std::uint32_t height, const PngOptions
 TEST(Png, RoundTripAndSameBytesTwice) {
   for (const std::uint32_t channels : {1U, 3U})
     for (const auto& [w, h] : {std::pair{1U, 1U}, {7U, 5U}, {300U, 200U}}) {
-      const Image image = noise(w, h, channels);
-      const std::string bytes = write_png(image);
-      EXPECT_EQ(read_png(bytes, "x"), image);
-      EXPECT_EQ(write_png(image), bytes);
+      const texture::Image image = noise(w, h, channels);
+      const std::string bytes = formats::write_png(image);
+      EXPECT_EQ(formats::read_png(bytes, "x"), image);
+      EXPECT_EQ(formats::write_png(image), bytes);
       EXPECT_EQ(bytes.find("tIME"), std::string::npos);
     }
 }
 
 TEST(Png, EveryKindGivesItsStoredValues) {
-  EXPECT_EQ(read_png(make_png(3, 1, {16, PNG_COLOR_TYPE_GRAY}, {{0, 0, 128, 127, 255, 255}}), "x"),
-            (Image{3, 1, 1, {0, 128, 255}})); // 32895 / 257 = 127.996
+  EXPECT_EQ(formats::read_png(
+                make_png(3, 1, {16, PNG_COLOR_TYPE_GRAY}, {{0, 0, 128, 127, 255, 255}}), "x"),
+            (texture::Image{3, 1, 1, {0, 128, 255}})); // 32895 / 257 = 127.996
   // The nearest, not the upper byte: 255 / 257 = 0.99, 65024 / 257 = 253.01, 128 / 257 = 0.498.
-  EXPECT_EQ(read_png(make_png(3, 1, {16, PNG_COLOR_TYPE_GRAY}, {{0, 255, 254, 0, 0, 128}}), "x"),
-            (Image{3, 1, 1, {1, 253, 0}}));
-  EXPECT_EQ(read_png(make_png(4, 1, {2, PNG_COLOR_TYPE_GRAY}, {{0b00011011}}), "x"),
-            (Image{4, 1, 1, {0, 85, 170, 255}}));
-  EXPECT_EQ(read_png(make_png(4, 1, {2, PNG_COLOR_TYPE_PALETTE}, {{0b00011011}}), "x"),
-            (Image{4, 1, 3, {1, 2, 3, 10, 20, 30, 100, 110, 120, 0, 0, 255}}));
-  EXPECT_EQ(read_png(make_png(1, 1, {8, PNG_COLOR_TYPE_RGBA}, {{9, 8, 7, 0}}), "x"),
-            (Image{1, 1, 3, {9, 8, 7}}));
-  EXPECT_EQ(read_png(make_png(2, 1, {8, PNG_COLOR_TYPE_GRAY_ALPHA}, {{9, 0, 8, 255}}), "x"),
-            (Image{2, 1, 1, {9, 8}}));
+  EXPECT_EQ(
+      formats::read_png(make_png(3, 1, {16, PNG_COLOR_TYPE_GRAY}, {{0, 255, 254, 0, 0, 128}}), "x"),
+      (texture::Image{3, 1, 1, {1, 253, 0}}));
+  EXPECT_EQ(formats::read_png(make_png(4, 1, {2, PNG_COLOR_TYPE_GRAY}, {{0b00011011}}), "x"),
+            (texture::Image{4, 1, 1, {0, 85, 170, 255}}));
+  EXPECT_EQ(formats::read_png(make_png(4, 1, {2, PNG_COLOR_TYPE_PALETTE}, {{0b00011011}}), "x"),
+            (texture::Image{4, 1, 3, {1, 2, 3, 10, 20, 30, 100, 110, 120, 0, 0, 255}}));
+  EXPECT_EQ(formats::read_png(make_png(1, 1, {8, PNG_COLOR_TYPE_RGBA}, {{9, 8, 7, 0}}), "x"),
+            (texture::Image{1, 1, 3, {9, 8, 7}}));
+  EXPECT_EQ(
+      formats::read_png(make_png(2, 1, {8, PNG_COLOR_TYPE_GRAY_ALPHA}, {{9, 0, 8, 255}}), "x"),
+      (texture::Image{2, 1, 1, {9, 8}}));
   PngOptions odd;
   odd.gamma = true;
-  EXPECT_EQ(read_png(make_png(1, 1, odd, {{9, 8, 7}}), "x"), (Image{1, 1, 3, {9, 8, 7}}));
+  EXPECT_EQ(formats::read_png(make_png(1, 1, odd, {{9, 8, 7}}), "x"),
+            (texture::Image{1, 1, 3, {9, 8, 7}}));
 }
 
 TEST(Png, SixteenBitsAreKeptWhereTheyAreAskedFor) {
+  EXPECT_EQ(formats::read_deep_png(
+                make_png(3, 1, {16, PNG_COLOR_TYPE_GRAY}, {{0, 7, 128, 127, 255, 254}}), "x"),
+            (texture::DeepImage{3, 1, 1, {7, 0x807f, 0xfffe}}));
+  EXPECT_EQ(formats::read_deep_png(
+                make_png(1, 1, {16, PNG_COLOR_TYPE_RGBA}, {{1, 2, 3, 4, 5, 6, 0, 0}}), "x"),
+            (texture::DeepImage{1, 1, 3, {0x102, 0x304, 0x506}}));
+  EXPECT_EQ(formats::read_deep_png(make_png(4, 1, {2, PNG_COLOR_TYPE_GRAY}, {{0b00011011}}), "x"),
+            (texture::DeepImage{4, 1, 1, {0, 85 * 257, 170 * 257, 65535}}));
   EXPECT_EQ(
-      read_deep_png(make_png(3, 1, {16, PNG_COLOR_TYPE_GRAY}, {{0, 7, 128, 127, 255, 254}}), "x"),
-      (DeepImage{3, 1, 1, {7, 0x807f, 0xfffe}}));
+      formats::read_deep_png(make_png(2, 1, {2, PNG_COLOR_TYPE_PALETTE}, {{0b00010000}}), "x"),
+      (texture::DeepImage{2, 1, 3, {257, 514, 771, 2570, 5140, 7710}}));
   EXPECT_EQ(
-      read_deep_png(make_png(1, 1, {16, PNG_COLOR_TYPE_RGBA}, {{1, 2, 3, 4, 5, 6, 0, 0}}), "x"),
-      (DeepImage{1, 1, 3, {0x102, 0x304, 0x506}}));
-  EXPECT_EQ(read_deep_png(make_png(4, 1, {2, PNG_COLOR_TYPE_GRAY}, {{0b00011011}}), "x"),
-            (DeepImage{4, 1, 1, {0, 85 * 257, 170 * 257, 65535}}));
-  EXPECT_EQ(read_deep_png(make_png(2, 1, {2, PNG_COLOR_TYPE_PALETTE}, {{0b00010000}}), "x"),
-            (DeepImage{2, 1, 3, {257, 514, 771, 2570, 5140, 7710}}));
-  EXPECT_EQ(read_deep_png(make_png(2, 1, {8, PNG_COLOR_TYPE_GRAY_ALPHA}, {{9, 0, 8, 255}}), "x"),
-            (DeepImage{2, 1, 1, {9 * 257, 8 * 257}}));
-  const Image image = noise(21, 13, 3);
-  const DeepImage deep = read_deep_png(write_png(image), "x");
+      formats::read_deep_png(make_png(2, 1, {8, PNG_COLOR_TYPE_GRAY_ALPHA}, {{9, 0, 8, 255}}), "x"),
+      (texture::DeepImage{2, 1, 1, {9 * 257, 8 * 257}}));
+  const texture::Image image = noise(21, 13, 3);
+  const texture::DeepImage deep = formats::read_deep_png(formats::write_png(image), "x");
   ASSERT_EQ(deep.values.size(), image.values.size());
   for (std::size_t n = 0; n < deep.values.size(); ++n)
     EXPECT_EQ(deep.values[n], image.values[n] * 257);
 }
 
 TEST(Png, InterlacedIsTheSameImage) {
-  const Image image = noise(21, 13, 3);
+  const texture::Image image = noise(21, 13, 3);
   std::vector<std::vector<std::uint8_t>> rows;
   for (std::size_t y = 0; y < 13; ++y)
     rows.emplace_back(image.values.begin() + static_cast<std::ptrdiff_t>(63 * y),
                       image.values.begin() + static_cast<std::ptrdiff_t>(63 * (y + 1)));
   PngOptions options;
   options.interlace = PNG_INTERLACE_ADAM7;
-  EXPECT_EQ(read_png(make_png(21, 13, options, rows), "x"), image);
+  EXPECT_EQ(formats::read_png(make_png(21, 13, options, rows), "x"), image);
 }
 
-void expect_refused(const std::function<Image()>& read, const std::string& part) {
+void expect_refused(const std::function<texture::Image()>& read, const std::string& part) {
   try {
     (void)read();
     ADD_FAILURE() << "nothing thrown, expected " << part;
@@ -135,19 +141,20 @@ void expect_refused(const std::function<Image()>& read, const std::string& part)
 }
 
 TEST(Png, EveryTruncationAndEveryBrokenByteIsAnErrorOrAnImage) {
-  const std::string bytes = write_png(noise(9, 6, 3));
+  const std::string bytes = formats::write_png(noise(9, 6, 3));
   for (std::size_t n = 0; n < bytes.size(); ++n)
-    EXPECT_THROW((void)read_png(bytes.substr(0, n), "x"), Error) << n;
+    EXPECT_THROW((void)formats::read_png(bytes.substr(0, n), "x"), Error) << n;
   for (std::size_t n = 0; n < bytes.size(); ++n) {
     std::string broken = bytes;
     broken[n] = static_cast<char>(broken[n] ^ 0x41);
     try {
-      (void)read_png(broken, "x");
+      (void)formats::read_png(broken, "x");
     } catch (const Error&) {
     }
   }
-  expect_refused([&] { return read_png(bytes.substr(0, 40), "x.png"); }, "x.png: byte 40: ");
-  expect_refused([&] { return read_png("GIF", "x"); }, "x: byte ");
+  expect_refused([&] { return formats::read_png(bytes.substr(0, 40), "x.png"); },
+                 "x.png: byte 40: ");
+  expect_refused([&] { return formats::read_png("GIF", "x"); }, "x: byte ");
 }
 
 /// The head of a PNG that claims w × h pixels, with a right checksum, and nothing behind it.
@@ -170,36 +177,44 @@ std::string claim(std::uint32_t w, std::uint32_t h) {
 }
 
 TEST(Png, AbsurdSizesTakeNoMemory) {
-  expect_refused([] { return read_png(claim(2000000000, 2000000000), "x"); }, "x: byte ");
-  expect_refused([] { return read_png(claim(30000, 30000), "x"); }, "30000 x 30000 pixels in ");
+  expect_refused([] { return formats::read_png(claim(2000000000, 2000000000), "x"); }, "x: byte ");
+  expect_refused([] { return formats::read_png(claim(30000, 30000), "x"); },
+                 "30000 x 30000 pixels in ");
 }
 
 TEST(Pnm, AllFourKinds) {
-  EXPECT_EQ(read_pnm("P2 3 1 255\n0 128 255\n", "x"), (Image{3, 1, 1, {0, 128, 255}}));
-  EXPECT_EQ(read_pnm("P2#c\n3#c\n1 5 # x\n0 1\t5", "x"), (Image{3, 1, 1, {0, 51, 255}}));
-  EXPECT_EQ(read_pnm("P3 1 2 65535 0 65535 32768 1 2 3", "x"),
-            (Image{1, 2, 3, {0, 255, 128, 0, 0, 0}}));
-  EXPECT_EQ(read_pnm("P2 4 1 65535 128 129 65406 65407", "x"), (Image{4, 1, 1, {0, 1, 254, 255}}));
-  EXPECT_EQ(read_pnm("P5 2 1 255\n#a", "x"), (Image{2, 1, 1, {'#', 'a'}}));
-  EXPECT_EQ(read_pnm(std::string("P5 1 1 65535\n\xff\0", 15), "x"), (Image{1, 1, 1, {254}}));
-  EXPECT_EQ(read_pnm("P6 1 1 255\nabc", "x"), (Image{1, 1, 3, {'a', 'b', 'c'}}));
-  const Image image = noise(20, 10, 3);
-  EXPECT_EQ(read_pnm(write_ppm(image), "x"), image);
+  EXPECT_EQ(formats::read_pnm("P2 3 1 255\n0 128 255\n", "x"),
+            (texture::Image{3, 1, 1, {0, 128, 255}}));
+  EXPECT_EQ(formats::read_pnm("P2#c\n3#c\n1 5 # x\n0 1\t5", "x"),
+            (texture::Image{3, 1, 1, {0, 51, 255}}));
+  EXPECT_EQ(formats::read_pnm("P3 1 2 65535 0 65535 32768 1 2 3", "x"),
+            (texture::Image{1, 2, 3, {0, 255, 128, 0, 0, 0}}));
+  EXPECT_EQ(formats::read_pnm("P2 4 1 65535 128 129 65406 65407", "x"),
+            (texture::Image{4, 1, 1, {0, 1, 254, 255}}));
+  EXPECT_EQ(formats::read_pnm("P5 2 1 255\n#a", "x"), (texture::Image{2, 1, 1, {'#', 'a'}}));
+  EXPECT_EQ(formats::read_pnm(std::string("P5 1 1 65535\n\xff\0", 15), "x"),
+            (texture::Image{1, 1, 1, {254}}));
+  EXPECT_EQ(formats::read_pnm("P6 1 1 255\nabc", "x"), (texture::Image{1, 1, 3, {'a', 'b', 'c'}}));
+  const texture::Image image = noise(20, 10, 3);
+  EXPECT_EQ(formats::read_pnm(formats::write_ppm(image), "x"), image);
 }
 
 TEST(Pnm, SixteenBitsAreKeptWhereTheyAreAskedFor) {
-  EXPECT_EQ(read_deep_pnm("P2 3 1 65535 0 65535\n32769 ", "x"),
-            (DeepImage{3, 1, 1, {0, 65535, 32769}}));
-  EXPECT_EQ(read_deep_pnm("P3 1 1 255 0 1 255", "x"), (DeepImage{1, 1, 3, {0, 257, 65535}}));
-  EXPECT_EQ(read_deep_pnm("P2 2 1 1000 1 #\n 1000", "x"), (DeepImage{2, 1, 1, {66, 65535}}));
-  EXPECT_EQ(read_deep_pnm(std::string("P5 1 1 65535\n\xff\0", 15), "x"),
-            (DeepImage{1, 1, 1, {0xff00}}));
-  EXPECT_EQ(read_deep_pnm("P2 2 1 255 0000000012 00001", "x"), (DeepImage{2, 1, 1, {3084, 257}}));
+  EXPECT_EQ(formats::read_deep_pnm("P2 3 1 65535 0 65535\n32769 ", "x"),
+            (texture::DeepImage{3, 1, 1, {0, 65535, 32769}}));
+  EXPECT_EQ(formats::read_deep_pnm("P3 1 1 255 0 1 255", "x"),
+            (texture::DeepImage{1, 1, 3, {0, 257, 65535}}));
+  EXPECT_EQ(formats::read_deep_pnm("P2 2 1 1000 1 #\n 1000", "x"),
+            (texture::DeepImage{2, 1, 1, {66, 65535}}));
+  EXPECT_EQ(formats::read_deep_pnm(std::string("P5 1 1 65535\n\xff\0", 15), "x"),
+            (texture::DeepImage{1, 1, 1, {0xff00}}));
+  EXPECT_EQ(formats::read_deep_pnm("P2 2 1 255 0000000012 00001", "x"),
+            (texture::DeepImage{2, 1, 1, {3084, 257}}));
 }
 
 TEST(Pnm, BadFilesAreOneLine) {
   const auto refused = [](const std::string& bytes, const std::string& part) {
-    expect_refused([&] { return read_pnm(bytes, "x"); }, part);
+    expect_refused([&] { return formats::read_pnm(bytes, "x"); }, part);
   };
   refused("P1 1 1 1", "x:1: no PNM");
   refused("", "x:1: no PNM");
@@ -222,28 +237,28 @@ TEST(Pnm, BadFilesAreOneLine) {
   refused("P5 1 1 9\na", "byte 9: value 97, expected at most 9");
   const std::string whole = "P3 2 1 255 11 22 33 44 55 66";
   for (std::size_t n = 0; n + 1 < whole.size(); ++n)
-    EXPECT_THROW((void)read_pnm(whole.substr(0, n), "x"), Error) << n;
+    EXPECT_THROW((void)formats::read_pnm(whole.substr(0, n), "x"), Error) << n;
 }
 
 TEST(ImageFile, IsToldByItsFirstBytes) {
-  const Image image = noise(8, 8, 3);
-  for (const std::string& bytes : {write_png(image), write_ppm(image)}) {
+  const texture::Image image = noise(8, 8, 3);
+  for (const std::string& bytes : {formats::write_png(image), formats::write_ppm(image)}) {
     const ScratchFile file(".dat");
     std::ofstream(file.path(), std::ios::binary) << bytes;
-    Input input(file.path());
-    EXPECT_EQ(read_image(input, {}), image);
+    formats::Input input(file.path());
+    EXPECT_EQ(formats::read_image(input, {}), image);
   }
   {
     const ScratchFile file(".dat");
     std::ofstream(file.path()) << "P3 2 1 255 1 0 0  255 255 255 "; // 2126 · 257 / 10000 = 54.6
-    Input input(file.path());
-    EXPECT_EQ(read_heights(input, {}), (Heights{2, 1, {55, 65535}}));
+    formats::Input input(file.path());
+    EXPECT_EQ(formats::read_heights(input, {}), (texture::Heights{2, 1, {55, 65535}}));
   }
   const ScratchFile file(".png");
   std::ofstream(file.path()) << "GIF89a";
-  Input input(file.path());
-  EXPECT_THROW((void)read_image(input, {}), Error);
+  formats::Input input(file.path());
+  EXPECT_THROW((void)formats::read_image(input, {}), Error);
 }
 
 } // namespace
-} // namespace gewebe
+} // namespace gewebe::test

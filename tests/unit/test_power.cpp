@@ -7,7 +7,7 @@
 #include <limits>
 #include <random>
 
-namespace gewebe {
+namespace gewebe::test {
 namespace {
 
 double ulps(double found, long double exact) {
@@ -22,27 +22,28 @@ TEST(Power, ExponentialIsWithinAnUlpOfTheExactOne) {
   double worst = 0;
   for (int n = 0; n < 300000; ++n) {
     for (const double x : {wide(random), near(random), std::ldexp(near(random), -n % 60)})
-      worst = test::larger(worst, ulps(exponential(x), std::exp(static_cast<long double>(x))));
+      worst =
+          test::larger(worst, ulps(numeric::exponential(x), std::exp(static_cast<long double>(x))));
   }
   EXPECT_LE(worst, 1);
-  EXPECT_EQ(exponential(0), 1);
-  EXPECT_EQ(exponential(-0.0), 1);
+  EXPECT_EQ(numeric::exponential(0), 1);
+  EXPECT_EQ(numeric::exponential(-0.0), 1);
 }
 
 TEST(Power, EndsOfTheRange) {
   const double inf = std::numeric_limits<double>::infinity();
-  EXPECT_EQ(exponential(inf), inf);
-  EXPECT_EQ(exponential(709.79), inf);
-  EXPECT_LT(exponential(709.78), inf);
-  EXPECT_EQ(exponential(-inf), 0);
-  EXPECT_EQ(exponential(-750), 0);
-  EXPECT_EQ(exponential(-744.4), 0x1p-1074);
-  EXPECT_TRUE(std::isnan(exponential(std::nan(""))));
-  EXPECT_EQ(power(0, 2), 0);
-  EXPECT_EQ(power(0, -2), inf);
-  EXPECT_EQ(power(0, 0), 1);
-  EXPECT_EQ(power(1, 1e300), 1);
-  EXPECT_TRUE(std::isnan(power(-1, 0.5)));
+  EXPECT_EQ(numeric::exponential(inf), inf);
+  EXPECT_EQ(numeric::exponential(709.79), inf);
+  EXPECT_LT(numeric::exponential(709.78), inf);
+  EXPECT_EQ(numeric::exponential(-inf), 0);
+  EXPECT_EQ(numeric::exponential(-750), 0);
+  EXPECT_EQ(numeric::exponential(-744.4), 0x1p-1074);
+  EXPECT_TRUE(std::isnan(numeric::exponential(std::nan(""))));
+  EXPECT_EQ(numeric::power(0, 2), 0);
+  EXPECT_EQ(numeric::power(0, -2), inf);
+  EXPECT_EQ(numeric::power(0, 0), 1);
+  EXPECT_EQ(numeric::power(1, 1e300), 1);
+  EXPECT_TRUE(std::isnan(numeric::power(-1, 0.5)));
 }
 
 TEST(Power, PowersAreAsExactAsTheirExponentAllows) {
@@ -52,12 +53,12 @@ TEST(Power, PowersAreAsExactAsTheirExponentAllows) {
   for (int n = 0; n < 300000; ++n) {
     const double x = base(random), y = exponent(random);
     const long double exact = std::pow(static_cast<long double>(x), static_cast<long double>(y));
-    worst = test::larger(
-        worst, static_cast<double>(std::abs(static_cast<long double>(power(x, y)) / exact - 1)) /
-                   (2 + std::abs(y * std::log(x))));
+    worst = test::larger(worst, static_cast<double>(std::abs(
+                                    static_cast<long double>(numeric::power(x, y)) / exact - 1)) /
+                                    (2 + std::abs(y * std::log(x))));
   }
   EXPECT_LE(worst, 2.3e-16);
 }
 
 } // namespace
-} // namespace gewebe
+} // namespace gewebe::test

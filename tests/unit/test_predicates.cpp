@@ -11,13 +11,14 @@ namespace {
 
 using gewebe::Vec3;
 
-int rational_turn(const Vec3& a, const Vec3& b, const Vec3& c) {
+int rational_turn(const gewebe::Vec3& a, const gewebe::Vec3& b, const gewebe::Vec3& c) {
   const mpq_class ax(a.x), ay(a.y), bx(b.x), by(b.y), cx(c.x), cy(c.y);
   const mpq_class det = (bx - ax) * (cy - ay) - (by - ay) * (cx - ax);
   return sgn(det);
 }
 
-int rational_side(const Vec3& a, const Vec3& b, const Vec3& c, const Vec3& q) {
+int rational_side(const gewebe::Vec3& a, const gewebe::Vec3& b, const gewebe::Vec3& c,
+                  const gewebe::Vec3& q) {
   const mpq_class ax(a.x), ay(a.y), az(a.z);
   const mpq_class ux = mpq_class(b.x) - ax, uy = mpq_class(b.y) - ay, uz = mpq_class(b.z) - az;
   const mpq_class vx = mpq_class(c.x) - ax, vy = mpq_class(c.y) - ay, vz = mpq_class(c.z) - az;
@@ -27,7 +28,8 @@ int rational_side(const Vec3& a, const Vec3& b, const Vec3& c, const Vec3& q) {
   return sgn(det);
 }
 
-int turn(const Vec3& a, const Vec3& b, const Vec3& c, std::uint64_t& exact) {
+int turn(const gewebe::Vec3& a, const gewebe::Vec3& b, const gewebe::Vec3& c,
+         std::uint64_t& exact) {
   return gewebe::turn_sign(a.x, a.y, b.x, b.y, c.x, c.y, exact);
 }
 
@@ -58,10 +60,10 @@ TEST(Predicates, TurnAgreesWithRationalsNearALine) {
   int naive_wrong = 0;
   for (int n = 0; n < 20000; ++n) {
     const double scale = std::ldexp(1.0, static_cast<int>(random() % 25));
-    const Vec3 a{scale * unit(random), scale * unit(random), 0};
-    const Vec3 b{scale * unit(random), scale * unit(random), 0};
+    const gewebe::Vec3 a{scale * unit(random), scale * unit(random), 0};
+    const gewebe::Vec3 b{scale * unit(random), scale * unit(random), 0};
     const double t = unit(random);
-    Vec3 c{a.x + t * (b.x - a.x), a.y + t * (b.y - a.y), 0};
+    gewebe::Vec3 c{a.x + t * (b.x - a.x), a.y + t * (b.y - a.y), 0};
     for (int s = nudge(random); s > 0; --s)
       c.y = std::nextafter(c.y, 1e30);
     const int expected = rational_turn(a, b, c);
@@ -83,15 +85,15 @@ TEST(Predicates, SideAgreesWithRationalsNearAPlane) {
     // Integer query points, as the voxelizer has them, close to the triangle's plane.
     const double scale = std::ldexp(1.0, static_cast<int>(random() % 20));
     const auto point = [&] {
-      Vec3 p{scale * unit(random), scale * unit(random), scale * unit(random)};
+      gewebe::Vec3 p{scale * unit(random), scale * unit(random), scale * unit(random)};
       if (n % 3 == 0)
         p = {std::round(p.x), std::round(p.y), std::round(p.z)};
       return p;
     };
-    const Vec3 a = point(), b = point();
-    Vec3 c = point();
-    const Vec3 q{std::round(scale * unit(random)), std::round(scale * unit(random)),
-                 std::round(scale * unit(random))};
+    const gewebe::Vec3 a = point(), b = point();
+    gewebe::Vec3 c = point();
+    const gewebe::Vec3 q{std::round(scale * unit(random)), std::round(scale * unit(random)),
+                         std::round(scale * unit(random))};
     const double s = unit(random), t = unit(random);
     c = q + s * (a - q) + t * (b - q);
     if (n % 7 == 0)
@@ -100,7 +102,7 @@ TEST(Predicates, SideAgreesWithRationalsNearAPlane) {
     zeros += expected == 0;
     ASSERT_EQ(gewebe::side_sign(a, b, c, q, exact), expected);
     ASSERT_EQ(gewebe::side_sign(b, a, c, q, exact), -expected);
-    const double det = dot(cross(b - a, c - a), q - a);
+    const double det = gewebe::dot(gewebe::cross(b - a, c - a), q - a);
     naive_wrong += ((det > 0) - (det < 0)) != expected;
   }
   EXPECT_GT(exact, 1000u);
@@ -112,14 +114,14 @@ TEST(Predicates, AnyMagnitude) {
   std::mt19937_64 random(3);
   std::uint64_t exact = 0;
   for (int n = 0; n < 5000; ++n) {
-    const auto point = [&] { return Vec3{wild(random), wild(random), wild(random)}; };
-    const Vec3 a = point(), b = point(), q = point();
-    const Vec3 c = n % 2 == 0 ? point() : Vec3{a.x + b.x, a.y + b.y, a.z + b.z};
-    const auto small = [](const Vec3& p) {
-      return Vec3{gewebe::predicate_coordinate(p.x), gewebe::predicate_coordinate(p.y),
-                  gewebe::predicate_coordinate(p.z)};
+    const auto point = [&] { return gewebe::Vec3{wild(random), wild(random), wild(random)}; };
+    const gewebe::Vec3 a = point(), b = point(), q = point();
+    const gewebe::Vec3 c = n % 2 == 0 ? point() : gewebe::Vec3{a.x + b.x, a.y + b.y, a.z + b.z};
+    const auto small = [](const gewebe::Vec3& p) {
+      return gewebe::Vec3{gewebe::predicate_coordinate(p.x), gewebe::predicate_coordinate(p.y),
+                          gewebe::predicate_coordinate(p.z)};
     };
-    const Vec3 d = small(c);
+    const gewebe::Vec3 d = small(c);
     ASSERT_EQ(turn(a, b, d, exact), rational_turn(a, b, d));
     ASSERT_EQ(gewebe::side_sign(a, b, d, q, exact), rational_side(a, b, d, q));
   }

@@ -10,16 +10,18 @@
 #include <gtest/gtest.h>
 #include <map>
 
-namespace gewebe {
+namespace gewebe::test {
 namespace {
 
 std::map<std::string, std::uint64_t> counts(const char* text) {
-  BuildOptions options;
+  model::BuildOptions options;
   options.centrals = 0;
-  const Model model =
-      build_model(primitive_mesh(parse_primitive(text, "")), options, Context{}).model;
+  const model::Model model =
+      model::build_model(model::primitive_mesh(model::parse_primitive(text, "")), options,
+                         Context{})
+          .model;
   std::map<std::string, std::uint64_t> result;
-  for (const auto& [key, count] : model_counts(model, Context{}))
+  for (const auto& [key, count] : model::model_counts(model, Context{}))
     result[key] = count;
   return result;
 }
@@ -52,13 +54,13 @@ double volume(const TriangleMesh& mesh) {
 }
 
 TEST(Primitive, StandsWhereItShouldSeenFromOutside) {
-  const TriangleMesh sphere = primitive_mesh(parse_primitive("sphere:64x63", "7"));
+  const TriangleMesh sphere = model::primitive_mesh(model::parse_primitive("sphere:64x63", "7"));
   double error = 0;
   for (const Vec3& p : sphere.points)
     error = test::larger(error, std::abs(norm(p) - 7));
   EXPECT_LT(error, 1e-14);
   EXPECT_NEAR(volume(sphere) / (4 * M_PI / 3 * 343), 1, 0.01);
-  const TriangleMesh tube = primitive_mesh(parse_primitive("tube:48x9", "3,20"));
+  const TriangleMesh tube = model::primitive_mesh(model::parse_primitive("tube:48x9", "3,20"));
   error = 0;
   for (std::size_t i = 0; i < 48; ++i)
     error = test::larger(error,
@@ -71,7 +73,7 @@ TEST(Primitive, StandsWhereItShouldSeenFromOutside) {
     const Vec3 out = cross(b - a, c - a);
     EXPECT_GT(out.x * a.x + out.y * a.y, 0);
   }
-  const TriangleMesh plane = primitive_mesh(parse_primitive("plane:4x3", "30"));
+  const TriangleMesh plane = model::primitive_mesh(model::parse_primitive("plane:4x3", "30"));
   EXPECT_EQ(plane.points.back(), (Vec3{30, 30, 0}));
   for (const Triangle& t : plane.triangles)
     EXPECT_GT(
@@ -83,25 +85,25 @@ TEST(Primitive, RefusesWhatItIsNot) {
   for (const char* text :
        {"", "plane", "plane:", "plane:3", "plane:3x", "cube:3x3", "plane:1x5", "tube:2x5",
         "sphere:3x0", "plane:3x3x3", "plane:-3x3", "plane:100000x100000"})
-    EXPECT_THROW((void)parse_primitive(text, ""), Error) << text;
+    EXPECT_THROW((void)model::parse_primitive(text, ""), Error) << text;
   for (const char* size : {"0", "-1", "nan", "1,", "1,2,3", "a"})
-    EXPECT_THROW((void)parse_primitive("plane:3x3", size), Error) << size;
-  EXPECT_THROW((void)parse_primitive("sphere:3x3", "1,2"), Error);
+    EXPECT_THROW((void)model::parse_primitive("plane:3x3", size), Error) << size;
+  EXPECT_THROW((void)model::parse_primitive("sphere:3x3", "1,2"), Error);
 }
 
 TEST(ModelMasses, AreScaledJustSoThatAStepIsSafe) {
-  Model model = test::organ();
-  const double before = safe_step(model), mass = total_mass(model);
-  EXPECT_EQ(scale_masses(model, 0.5 * before), 0U);
-  EXPECT_EQ(total_mass(model), mass);
-  EXPECT_GT(scale_masses(model, 3 * before), 0U);
-  EXPECT_GE(safe_step(model), 3 * before);
-  EXPECT_LT(safe_step(model), 3 * before * (1 + 1e-12));
-  EXPECT_GT(total_mass(model), mass);
-  Elastodynamic object(model);
+  model::Model model = test::organ();
+  const double before = model::safe_step(model), mass = model::total_mass(model);
+  EXPECT_EQ(model::scale_masses(model, 0.5 * before), 0U);
+  EXPECT_EQ(model::total_mass(model), mass);
+  EXPECT_GT(model::scale_masses(model, 3 * before), 0U);
+  EXPECT_GE(model::safe_step(model), 3 * before);
+  EXPECT_LT(model::safe_step(model), 3 * before * (1 + 1e-12));
+  EXPECT_GT(model::total_mass(model), mass);
+  dynamics::Elastodynamic object(model);
   object.set_load({.gravity = {0, 0, -9810}});
   EXPECT_NO_THROW((void)object.advance(9000 * before, 3 * before, Context{}));
 }
 
 } // namespace
-} // namespace gewebe
+} // namespace gewebe::test

@@ -20,7 +20,7 @@
 #include <iterator>
 #include <map>
 
-namespace gewebe {
+namespace gewebe::test {
 namespace {
 
 using test::compare;
@@ -42,7 +42,7 @@ TriangleMesh quad(double width, double height, float s, float t) {
 
 struct Case {
   OracleScene scene;
-  CameraOptions camera;
+  shading::CameraOptions camera;
   std::uint32_t width = 224, height = 160;
   int samples = 1;
 };
@@ -60,41 +60,43 @@ Case textured(TriangleMesh mesh, const std::string& view) {
 /// A way of drawing, and what it is held to: RMS against the oracle rounded to 8 bits.
 struct Mode {
   const char* name;
-  Backend backend;
-  GlMode gl;
+  render::Backend backend;
+  gl::GlMode gl;
   bool wide, per_pixel;
   double rms;
 };
 
-constexpr Mode modes[] = {{"cpu", Backend::cpu, GlMode::shader, true, true, 0.05},
-                          {"cpu_by_vertex", Backend::cpu, GlMode::shader, true, false, 0.05},
-                          {"shader", Backend::gl, GlMode::shader, true, true, 0.05},
-                          {"shader_by_vertex", Backend::gl, GlMode::shader, true, false, 0.05},
-                          {"passes3", Backend::gl, GlMode::passes3, true, false, 0.1},
-                          {"passes2", Backend::gl, GlMode::passes2, true, false, 0.1},
-                          {"passes1", Backend::gl, GlMode::passes1, true, false, 0.5},
-                          {"passes3_8bit", Backend::gl, GlMode::passes3, false, false, 0.9},
-                          {"passes2_8bit", Backend::gl, GlMode::passes2, false, false, 0.9},
-                          {"passes1_8bit", Backend::gl, GlMode::passes1, false, false, 0.5}};
+constexpr Mode modes[] = {
+    {"cpu", render::Backend::cpu, gl::GlMode::shader, true, true, 0.05},
+    {"cpu_by_vertex", render::Backend::cpu, gl::GlMode::shader, true, false, 0.05},
+    {"shader", render::Backend::gl, gl::GlMode::shader, true, true, 0.05},
+    {"shader_by_vertex", render::Backend::gl, gl::GlMode::shader, true, false, 0.05},
+    {"passes3", render::Backend::gl, gl::GlMode::passes3, true, false, 0.1},
+    {"passes2", render::Backend::gl, gl::GlMode::passes2, true, false, 0.1},
+    {"passes1", render::Backend::gl, gl::GlMode::passes1, true, false, 0.5},
+    {"passes3_8bit", render::Backend::gl, gl::GlMode::passes3, false, false, 0.9},
+    {"passes2_8bit", render::Backend::gl, gl::GlMode::passes2, false, false, 0.9},
+    {"passes1_8bit", render::Backend::gl, gl::GlMode::passes1, false, false, 0.5}};
 
 bool is_there(const Mode& mode) {
   static const bool gl_is_there = [] {
     try {
-      const GlContext gl;
+      const gl::GlContext gl;
       return true;
     } catch (const Error&) {
       return false;
     }
   }();
-  return mode.backend == Backend::cpu || gl_is_there;
+  return mode.backend == render::Backend::cpu || gl_is_there;
 }
 
-Image draw(const Case& c, const Mode& mode, Camera& camera, Vec3& light, double sign = 1) {
-  std::vector<Surface> surfaces(1);
+texture::Image draw(const Case& c, const Mode& mode, shading::Camera& camera, Vec3& light,
+                    double sign = 1) {
+  std::vector<shading::Surface> surfaces(1);
   surfaces[0].mesh = c.scene.mesh;
-  camera = make_camera(c.camera, rest_box(surfaces), c.width, c.height);
-  light = c.scene.directional ? c.scene.light : default_light(camera);
-  DrawingOptions options;
+  camera = shading::make_camera(c.camera, shading::rest_box(surfaces), c.width, c.height);
+  light = c.scene.directional ? c.scene.light : shading::default_light(camera);
+  shading::DrawingOptions options;
   options.texcoords = true;
   options.structure = c.scene.structure || c.scene.heights;
   options.sphere = c.scene.reflection.has_value();
@@ -111,22 +113,22 @@ Image draw(const Case& c, const Mode& mode, Camera& camera, Vec3& light, double 
   options.shade = c.scene.shade;
   options.full_distance = c.scene.full_distance;
   options.camera = camera;
-  PictureOptions picture;
+  render::PictureOptions picture;
   picture.backend = mode.backend;
   picture.gl.mode = mode.gl;
   picture.gl.wide = mode.wide;
   picture.samples = c.samples;
   picture.width = c.width;
   picture.height = c.height;
-  return make_picture(make_drawing(surfaces, options, {}), camera, test::material_of(c.scene),
-                      picture, {});
+  return render::make_picture(shading::make_drawing(surfaces, options, {}), camera,
+                              test::material_of(c.scene), picture, {});
 }
 
 /// `name` names the case within its test: modes share its oracle.
 OracleComparison held_against_oracle(Case c, const Mode& mode, const std::string& name = "",
                                      double sign = 1, bool clamp_early = false) {
-  Camera camera;
-  const Image image = draw(c, mode, camera, c.scene.light, sign);
+  shading::Camera camera;
+  const texture::Image image = draw(c, mode, camera, c.scene.light, sign);
   c.scene.clamp_early = clamp_early;
   c.scene.per_pixel = mode.per_pixel;
   static std::map<std::string, test::OraclePicture> kept;
@@ -158,15 +160,15 @@ protected:
 
 TEST_P(RenderOracle, Sphere) {
   TriangleMesh ball = test::sphere_mesh(4, 30, {100, -20, 7});
-  UvFrame frame{UvMapping::sphere, bounding_box(ball), 1};
-  ball.texcoords = make_texcoords(ball.points, ball.triangles, frame, {});
+  shading::UvFrame frame{shading::UvMapping::sphere, bounding_box(ball), 1};
+  ball.texcoords = shading::make_texcoords(ball.points, ball.triangles, frame, {});
   expect_equal(textured(ball, "iso"), "sphere");
 }
 
 TEST_P(RenderOracle, BoxMappedSphereFarAway) {
   TriangleMesh ball = test::sphere_mesh(3, 30, {1e5, -20, 7});
-  UvFrame frame{UvMapping::box, bounding_box(ball), 25};
-  ball.texcoords = make_texcoords(ball.points, ball.triangles, frame, {});
+  shading::UvFrame frame{shading::UvMapping::box, bounding_box(ball), 25};
+  ball.texcoords = shading::make_texcoords(ball.points, ball.triangles, frame, {});
   for (const char* view : {"front", "left", "right", "bottom"})
     expect_equal(textured(ball, view), view);
 }
@@ -226,7 +228,7 @@ TEST_P(RenderOracle, DetailReflectionAndLightFarAway) {
 }
 
 TEST_P(RenderOracle, TexturesThatShrink) {
-  if (GetParam().backend != Backend::cpu)
+  if (GetParam().backend != render::Backend::cpu)
     GTEST_SKIP() << "drivers choose levels in their own ways";
   Case c = textured(quad(200, 30, 200, 30), "top");
   c.camera.eye = Vec3{-4, 15, 6};
@@ -248,7 +250,7 @@ Case three_materials() {
   second.base = spots(19, 64, 3);
   second.detail = spots(20, 31, 3);
   second.reflection = spots(33, 40, 3);
-  for (Image* image : {&*second.detail, &*second.reflection})
+  for (texture::Image* image : {&*second.detail, &*second.reflection})
     for (std::uint8_t& value : image->values)
       value = static_cast<std::uint8_t>(value / 3);
   third.structure = spots(50, 20, 1);
@@ -263,8 +265,8 @@ TEST_P(RenderOracle, EachMaterialHasItsOwnTextures) {
   // That it can fail: a picture in which two of them are exchanged.
   Case exchanged = c;
   std::swap(exchanged.scene.others[0], exchanged.scene.others[1]);
-  Camera camera;
-  const Image image = draw(exchanged, GetParam(), camera, c.scene.light);
+  shading::Camera camera;
+  const texture::Image image = draw(exchanged, GetParam(), camera, c.scene.light);
   c.scene.per_pixel = GetParam().per_pixel;
   EXPECT_GT(compare(image, c.scene, camera).rms, 20);
 }
@@ -278,11 +280,11 @@ TEST_P(RenderOracle, EqualMaterialsAreDrawnAsOne) {
     c.height = 80;
     c.scene.detail = spots(20, 31, 3);
     c.scene.others.clear();
-    Camera camera;
+    shading::Camera camera;
     Vec3 light;
-    const Image one = draw(c, GetParam(), camera, light);
+    const texture::Image one = draw(c, GetParam(), camera, light);
     c.scene.others = {c.scene, c.scene};
-    const Image grouped = draw(c, GetParam(), camera, light);
+    const texture::Image grouped = draw(c, GetParam(), camera, light);
     EXPECT_TRUE(grouped == one) << samples;
     c.scene.others[1].color = {0.4, 0.4, 0.4};
     EXPECT_FALSE(draw(c, GetParam(), camera, light) == one);
@@ -316,8 +318,8 @@ TEST_P(RenderOracle, ShallowHeightsAreSmoothIn16BitsAndStepsIn8) {
   c.camera.view = "top";
   c.scene.offset = 0.2;
   c.scene.color = {1, 0.9, 0.8};
-  Heights heights{96, 64, {}};
-  Image steps{96, 64, 1, {}};
+  texture::Heights heights{96, 64, {}};
+  texture::Image steps{96, 64, 1, {}};
   for (unsigned y = 0; y < 64; ++y)
     for (unsigned x = 0; x < 96; ++x) {
       const double f = 0.5 + 0.04 * std::sin(x / 96.0 * 6.2831853) * std::cos(y / 64.0 * 6.2831853);
@@ -330,8 +332,8 @@ TEST_P(RenderOracle, ShallowHeightsAreSmoothIn16BitsAndStepsIn8) {
   Case coarse = c;
   coarse.scene.heights.reset();
   coarse.scene.structure = steps;
-  Camera camera;
-  const Image image = draw(coarse, GetParam(), camera, c.scene.light);
+  shading::Camera camera;
+  const texture::Image image = draw(coarse, GetParam(), camera, c.scene.light);
   c.scene.per_pixel = GetParam().per_pixel;
   const OracleComparison stepped = compare(image, c.scene, camera);
   RecordProperty("stepped.rms", std::to_string(stepped.rms_rounded));
@@ -342,7 +344,7 @@ Case wet_torus() {
   Case c = textured(torus(60, 30, false), "iso");
   c.scene.shade = 0.6;
   c.scene.color = {0.7, 0.4, 0.3};
-  c.scene.film = {0.8, 0.4, water_reflectance};
+  c.scene.film = {0.8, 0.4, texture::water_reflectance};
   c.scene.background = {0.2, 0.3, 0.6};
   return c;
 }
@@ -361,14 +363,15 @@ TEST_P(RenderOracle, WetFilm) {
   c.scene.light = {3, 1, 2};
   expect_equal(c, "light far away");
   c.scene.structure.reset();
-  c.scene.film.reflectance = steel_reflectance;
+  c.scene.film.reflectance = texture::steel_reflectance;
   expect_equal(c, "smooth steel");
   // That it can fail: another film, relief the other way around.
   for (const double roughness : {0.4, 0.5}) {
     Case other = wet_torus();
     other.scene.film.roughness = roughness;
-    Camera camera;
-    const Image image = draw(other, GetParam(), camera, c.scene.light, roughness > 0.4 ? 1 : -1);
+    shading::Camera camera;
+    const texture::Image image =
+        draw(other, GetParam(), camera, c.scene.light, roughness > 0.4 ? 1 : -1);
     other.scene.film.roughness = 0.4;
     other.scene.light = c.scene.light;
     other.scene.per_pixel = true;
@@ -389,17 +392,18 @@ TEST_P(RenderOracle, WetFilmSeenFromTheLight) {
   c.scene.color = {0.5, 0.25, 0.125};
   c.scene.background = {0, 1, 0.5};
   for (const double roughness : {0.1, 0.35, 1.0}) {
-    c.scene.film = {0.7, roughness, water_reflectance};
-    Camera camera;
+    c.scene.film = {0.7, roughness, texture::water_reflectance};
+    shading::Camera camera;
     Vec3 light;
-    const Image image = draw(c, GetParam(), camera, light);
-    const double h = water_reflectance / (4 * std::pow(roughness, 4));
+    const texture::Image image = draw(c, GetParam(), camera, light);
+    const double h = texture::water_reflectance / (4 * std::pow(roughness, 4));
     for (int n = 0; n < 3; ++n) {
       const double own = c.scene.color[n];
-      EXPECT_NEAR(
-          image.values[3 * (101 * 50 + 50) + static_cast<std::size_t>(n)],
-          255 * std::min(1.0, own + 0.7 * (water_reflectance * (c.scene.background[n] - own) + h)),
-          0.51)
+      EXPECT_NEAR(image.values[3 * (101 * 50 + 50) + static_cast<std::size_t>(n)],
+                  255 * std::min(1.0, own + 0.7 * (texture::water_reflectance *
+                                                       (c.scene.background[n] - own) +
+                                                   h)),
+                  0.51)
           << roughness << n;
     }
   }
@@ -426,30 +430,31 @@ TEST_P(RenderOracle, FlatRampHasItsAnalyticValue) {
     Case c;
     c.scene.mesh = quad(100, 100, 1, 1);
     c.camera.view = "top";
-    Image ramp{256, 1, 1, {}};
+    texture::Image ramp{256, 1, 1, {}};
     for (unsigned x = 0; x < 256; ++x)
       ramp.values.push_back(static_cast<std::uint8_t>(x));
     c.scene.structure = ramp;
     c.scene.color = {0.5, 0.25, 1};
-    std::vector<Surface> surfaces(1);
+    std::vector<shading::Surface> surfaces(1);
     surfaces[0].mesh = c.scene.mesh;
-    const Camera camera = make_camera(c.camera, rest_box(surfaces), 64, 64);
-    DrawingOptions options;
+    const shading::Camera camera =
+        shading::make_camera(c.camera, shading::rest_box(surfaces), 64, 64);
+    shading::DrawingOptions options;
     options.texcoords = options.structure = true;
     options.offset = {0.2, 0.2};
     options.per_pixel = GetParam().per_pixel;
     // 30 degrees above the plane, so far that it is the same at every vertex.
     options.light = Vec3{(to_right ? 1 : -1) * std::sqrt(0.75), 0, 0.5} * 1e9;
-    SurfaceMaterial material;
-    material.structure = texture_from(ramp);
+    texture::SurfaceMaterial material;
+    material.structure = texture::texture_from(ramp);
     material.color = c.scene.color;
-    PictureOptions picture;
+    render::PictureOptions picture;
     picture.width = picture.height = 64;
     picture.backend = GetParam().backend;
     picture.gl.mode = GetParam().gl;
     picture.gl.wide = GetParam().wide;
-    const Image image =
-        make_picture(make_drawing(surfaces, options, {}), camera, material, picture, {});
+    const texture::Image image = render::make_picture(shading::make_drawing(surfaces, options, {}),
+                                                      camera, material, picture, {});
     const double ds = (to_right ? 1 : -1) * 0.2 * std::sqrt(0.75);
     const double r = 0.5 - 0.5 * ds * 256 / 255;
     constexpr std::size_t middle = std::size_t{3} * 64 * 32 + 96;
@@ -478,8 +483,8 @@ protected:
       for (const Mode& mode : modes) {
         if (mode.per_pixel != per_pixel || !is_there(mode))
           continue;
-        Camera camera;
-        const Image image = draw(c, mode, camera, c.scene.light);
+        shading::Camera camera;
+        const texture::Image image = draw(c, mode, camera, c.scene.light);
         if (oracle.empty())
           oracle = oracle_picture(c.scene, camera, c.width, c.height);
         const OracleComparison result = compare(image, oracle);
@@ -493,19 +498,19 @@ protected:
       }
     }
   }
-  static Image liver_texture() {
+  static texture::Image liver_texture() {
     const std::string path = test::shared_folder() + "/data/sofa_liver_texture_square.png";
     std::ifstream png(path, std::ios::binary);
     if (!png)
       return {};
-    return read_png(std::string((std::istreambuf_iterator<char>(png)), {}), path);
+    return formats::read_png(std::string((std::istreambuf_iterator<char>(png)), {}), path);
   }
 };
 
 TEST_F(RenderOracleLarge, Sphere) {
   TriangleMesh ball = test::sphere_mesh(4, 30, {100, -20, 7});
-  UvFrame frame{UvMapping::sphere, bounding_box(ball), 1};
-  ball.texcoords = make_texcoords(ball.points, ball.triangles, frame, {});
+  shading::UvFrame frame{shading::UvMapping::sphere, bounding_box(ball), 1};
+  ball.texcoords = shading::make_texcoords(ball.points, ball.triangles, frame, {});
   hold(textured(ball, "iso"), "sphere");
 }
 
@@ -514,32 +519,32 @@ TEST_F(RenderOracleLarge, Torus) {
 }
 
 TEST_F(RenderOracleLarge, SpleenWithItsOwnCoordinates) {
-  const Image texture = liver_texture();
+  const texture::Image texture = liver_texture();
   if (texture.width == 0)
     GTEST_SKIP() << "no data";
-  Input input(test::shared_folder() + "/data/hubmap_F_spleen_uv.obj");
-  Case c = textured(read_mesh(input, {Kind::obj, "m", {}, false}), "front");
+  formats::Input input(test::shared_folder() + "/data/hubmap_F_spleen_uv.obj");
+  Case c = textured(formats::read_mesh(input, {formats::Kind::obj, "m", {}, false}), "front");
   ASSERT_FALSE(c.scene.mesh.texcoords.empty());
   c.scene.base = texture;
-  c.scene.structure = luminance(texture);
+  c.scene.structure = texture::luminance(texture);
   c.scene.offset = 0.005;
   hold(c, "spleen");
 }
 
 TEST_F(RenderOracleLarge, Liver) {
-  const Image texture = liver_texture();
+  const texture::Image texture = liver_texture();
   if (texture.width == 0)
     GTEST_SKIP() << "no data";
-  Input input(test::shared_folder() + "/data/sofa_liver_smooth.obj");
-  TriangleMesh liver = read_mesh(input, {Kind::obj, "cm", {}, false});
-  UvFrame frame{UvMapping::sphere, bounding_box(liver), 1};
-  liver.texcoords = make_texcoords(liver.points, liver.triangles, frame, {});
+  formats::Input input(test::shared_folder() + "/data/sofa_liver_smooth.obj");
+  TriangleMesh liver = formats::read_mesh(input, {formats::Kind::obj, "cm", {}, false});
+  shading::UvFrame frame{shading::UvMapping::sphere, bounding_box(liver), 1};
+  liver.texcoords = shading::make_texcoords(liver.points, liver.triangles, frame, {});
   Case c = textured(liver, "front");
   c.scene.base = texture;
-  c.scene.structure = luminance(texture);
+  c.scene.structure = texture::luminance(texture);
   c.scene.offset = 0.005;
   hold(c, "liver");
 }
 
 } // namespace
-} // namespace gewebe
+} // namespace gewebe::test

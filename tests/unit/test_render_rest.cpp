@@ -28,7 +28,7 @@
 #include <utility>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::test {
 namespace {
 
 using test::OracleComparison;
@@ -45,8 +45,8 @@ struct Case {
   std::uint32_t width = 224, height = 160;
 };
 
-SolidTexture solid(const char* text) {
-  return solid_texture_from_text(text);
+texture::SolidTexture solid(const char* text) {
+  return texture::solid_texture_from_text(text);
 }
 
 TriangleMesh round_body() {
@@ -60,7 +60,7 @@ Case case_of(TriangleMesh mesh) {
   c.scene.per_pixel = true;
   c.scene.offset = 0.05;
   c.scene.color = {1, 0.6, 0.52}; // no halves of 1/255 where nothing else is
-  c.scene.rest = rest_mapping(bounding_box(c.scene.mesh), 17.0);
+  c.scene.rest = texture::rest_mapping(bounding_box(c.scene.mesh), 17.0);
   return c;
 }
 
@@ -90,8 +90,8 @@ Case veiny(TriangleMesh mesh) {
   return c;
 }
 
-DrawingOptions drawing_options(const OracleScene& scene, const Camera& camera) {
-  DrawingOptions options;
+shading::DrawingOptions drawing_options(const OracleScene& scene, const shading::Camera& camera) {
+  shading::DrawingOptions options;
   options.rest = options.rest_normals = true;
   options.rest_light = scene.structure || scene.solid_structure;
   for (const OracleScene& other : scene.others) {
@@ -109,7 +109,7 @@ DrawingOptions drawing_options(const OracleScene& scene, const Camera& camera) {
 bool has_gl() {
   static const bool there = [] {
     try {
-      const GlContext gl;
+      const gl::GlContext gl;
       return true;
     } catch (const Error&) {
       return false;
@@ -118,36 +118,38 @@ bool has_gl() {
   return there;
 }
 
-Image draw(Case& c, Backend backend, Camera& camera, CpuLevel cpu = CpuLevel::avx2) {
-  std::vector<Surface> surfaces(1);
+texture::Image draw(Case& c, render::Backend backend, shading::Camera& camera,
+                    CpuLevel cpu = CpuLevel::avx2) {
+  std::vector<shading::Surface> surfaces(1);
   surfaces[0].mesh = c.scene.mesh;
-  CameraOptions view;
+  shading::CameraOptions view;
   view.view = c.view;
-  camera = make_camera(view, rest_box(surfaces), c.width, c.height);
+  camera = shading::make_camera(view, shading::rest_box(surfaces), c.width, c.height);
   if (!c.scene.directional)
-    c.scene.light = default_light(camera);
-  PictureOptions picture;
+    c.scene.light = shading::default_light(camera);
+  render::PictureOptions picture;
   picture.backend = backend;
   picture.width = c.width;
   picture.height = c.height;
   Context context;
   context.cpu = test::smaller(context.cpu, cpu);
-  return make_picture(make_drawing(surfaces, drawing_options(c.scene, camera), context), camera,
-                      test::material_of(c.scene), picture, context);
+  return render::make_picture(
+      shading::make_drawing(surfaces, drawing_options(c.scene, camera), context), camera,
+      test::material_of(c.scene), picture, context);
 }
 
 /// Both backends against the formula.
 void expect_equal(Case c, const std::string& name, double share = 0.85) {
   test::OraclePicture oracle;
-  for (const Backend backend : {Backend::cpu, Backend::gl}) {
-    if (backend == Backend::gl && (!has_gl() || c.scene.mipmap))
+  for (const render::Backend backend : {render::Backend::cpu, render::Backend::gl}) {
+    if (backend == render::Backend::gl && (!has_gl() || c.scene.mipmap))
       continue; // drivers choose levels in their own ways
-    Camera camera;
-    const Image image = draw(c, backend, camera);
+    shading::Camera camera;
+    const texture::Image image = draw(c, backend, camera);
     if (oracle.empty())
       oracle = oracle_picture(c.scene, camera, c.width, c.height);
     const OracleComparison result = test::compare(image, oracle);
-    std::cout << name << (backend == Backend::cpu ? " cpu" : " shader") << ": RMS "
+    std::cout << name << (backend == render::Backend::cpu ? " cpu" : " shader") << ": RMS "
               << result.rms_rounded << ", largest " << result.max << ", " << result.interior
               << " of " << result.covered << " pixels\n";
     EXPECT_GT(result.covered, 3000U) << name;
@@ -190,8 +192,8 @@ TEST(RenderRest, RealOrgan) {
   const std::string path = test::shared_folder() + "/data/sofa_liver_smooth.obj";
   if (!std::ifstream(path))
     GTEST_SKIP() << "no data";
-  Input input(path);
-  const TriangleMesh liver = read_mesh(input, {Kind::obj, "cm", {}, false});
+  formats::Input input(path);
+  const TriangleMesh liver = formats::read_mesh(input, {formats::Kind::obj, "cm", {}, false});
   for (const auto& [make, name] : {std::pair{&triplanar, "liver, triplanar"},
                                    {&noisy, "liver, noise"},
                                    {&veiny, "liver, veins"}}) {
@@ -219,11 +221,11 @@ TEST(RenderRest, EachMaterialHasItsOwn) {
   // That it can fail: a picture in which two of them are exchanged.
   Case exchanged = c;
   std::swap(exchanged.scene.others[0], exchanged.scene.others[1]);
-  for (const Backend backend : {Backend::cpu, Backend::gl}) {
-    if (backend == Backend::gl && !has_gl())
+  for (const render::Backend backend : {render::Backend::cpu, render::Backend::gl}) {
+    if (backend == render::Backend::gl && !has_gl())
       continue;
-    Camera camera;
-    const Image image = draw(exchanged, backend, camera);
+    shading::Camera camera;
+    const texture::Image image = draw(exchanged, backend, camera);
     c.scene.light = exchanged.scene.light;
     EXPECT_GT(test::compare(image, c.scene, camera).rms, 10);
   }
@@ -235,7 +237,7 @@ Vec3 rotated(const Vec3& p) { // by the quaternion (1; 2, -1, 0.5), about the or
   return (p * (1 - dot(v, v)) + 2 * v * dot(v, p) + 2 * cross(v, p)) / square;
 }
 
-bool equal_at_rest(const Drawing& a, const Drawing& b) {
+bool equal_at_rest(const shading::Drawing& a, const shading::Drawing& b) {
   const auto same = [](const auto& x, const auto& y) {
     return x.size() == y.size() &&
            (x.empty() || std::memcmp(x.data(), y.data(), x.size() * sizeof x[0]) == 0);
@@ -248,48 +250,50 @@ bool equal_at_rest(const Drawing& a, const Drawing& b) {
 // A sequence at rest, moved twice, lit otherwise, and back at rest, next to a surface that rests.
 TEST(RenderRest, ASequenceIsTheSameAsDrawingsMadeAnew) {
   for (const double shade : {0.0, 0.5}) {
-    std::vector<Surface> surfaces(2);
+    std::vector<shading::Surface> surfaces(2);
     surfaces[0].mesh = round_body();
     surfaces[1].mesh = test::sphere_mesh(2, 5, {140, 0, 0});
     surfaces[1].mesh.material.assign(surfaces[1].mesh.triangles.size(), 1);
-    for (Surface& surface : surfaces)
+    for (shading::Surface& surface : surfaces)
       surface.rest = surface.mesh.points;
-    DrawingOptions options;
+    shading::DrawingOptions options;
     options.rest = options.rest_normals = options.rest_light = options.per_pixel = true;
     options.shade = shade;
     options.groups = {1};
     options.light = {300, 20, 100};
-    DrawingMaker maker;
-    const Drawing first = maker.make(surfaces, options, DrawingChange::all, {});
-    EXPECT_TRUE(equal_at_rest(first, make_drawing(surfaces, options, {})));
+    shading::DrawingMaker maker;
+    const shading::Drawing first = maker.make(surfaces, options, shading::DrawingChange::all, {});
+    EXPECT_TRUE(equal_at_rest(first, shading::make_drawing(surfaces, options, {})));
     EXPECT_TRUE(first.turns.empty());
     for (int step = 0; step < 2; ++step) {
       for (Vec3& p : surfaces[0].mesh.points)
         p = rotated(p) * 1.1;
-      const Drawing moved = maker.make(surfaces, options, DrawingChange::points, {});
-      EXPECT_TRUE(equal_at_rest(moved, make_drawing(surfaces, options, {}))) << step;
+      const shading::Drawing moved =
+          maker.make(surfaces, options, shading::DrawingChange::points, {});
+      EXPECT_TRUE(equal_at_rest(moved, shading::make_drawing(surfaces, options, {}))) << step;
       EXPECT_EQ(moved.turns.size(), moved.vertices.size());
       EXPECT_EQ(moved.rests[7].place, first.rests[7].place);
     }
     options.light = {-300, 20, 100};
-    const Drawing lit = maker.make(surfaces, options, DrawingChange::view, {});
-    EXPECT_TRUE(equal_at_rest(lit, make_drawing(surfaces, options, {})));
+    const shading::Drawing lit = maker.make(surfaces, options, shading::DrawingChange::view, {});
+    EXPECT_TRUE(equal_at_rest(lit, shading::make_drawing(surfaces, options, {})));
     EXPECT_FALSE(lit.turns.empty());
     // The other one moves instead.
     surfaces[0].mesh.points = surfaces[0].rest;
     for (Vec3& p : surfaces[1].mesh.points)
       p = rotated(p);
-    const Drawing other = maker.make(surfaces, options, DrawingChange::points, {});
-    EXPECT_TRUE(equal_at_rest(other, make_drawing(surfaces, options, {})));
+    const shading::Drawing other =
+        maker.make(surfaces, options, shading::DrawingChange::points, {});
+    EXPECT_TRUE(equal_at_rest(other, shading::make_drawing(surfaces, options, {})));
     surfaces[1].mesh.points = surfaces[1].rest;
-    const Drawing back = maker.make(surfaces, options, DrawingChange::points, {});
-    EXPECT_TRUE(equal_at_rest(back, make_drawing(surfaces, options, {})));
+    const shading::Drawing back = maker.make(surfaces, options, shading::DrawingChange::points, {});
+    EXPECT_TRUE(equal_at_rest(back, shading::make_drawing(surfaces, options, {})));
     EXPECT_TRUE(back.turns.empty());
     // That telling it too little is seen.
     for (Vec3& p : surfaces[0].mesh.points)
       p = rotated(p);
-    EXPECT_FALSE(equal_at_rest(maker.make(surfaces, options, DrawingChange::view, {}),
-                               make_drawing(surfaces, options, {})));
+    EXPECT_FALSE(equal_at_rest(maker.make(surfaces, options, shading::DrawingChange::view, {}),
+                               shading::make_drawing(surfaces, options, {})));
   }
 }
 
@@ -298,8 +302,8 @@ TEST(RenderRest, OtherFormulasAreSeen) {
   const auto seen = [](Case c, const std::function<void(OracleScene&)>& change) {
     c.width = 60;
     c.height = 50;
-    Camera camera;
-    const Image image = draw(c, Backend::cpu, camera);
+    shading::Camera camera;
+    const texture::Image image = draw(c, render::Backend::cpu, camera);
     EXPECT_LE(test::compare(image, c.scene, camera).rms_rounded, 0.1);
     change(c.scene);
     EXPECT_GT(test::compare(image, c.scene, camera).rms_rounded, 0.5);
@@ -319,9 +323,9 @@ TEST(RenderRest, OtherFormulasAreSeen) {
 TEST(RenderRest, BytesDoNotDependOnTheProcessor) {
   for (Case c : {triplanar(round_body()), noisy(round_body()), veiny(round_body())}) {
     c.scene.mipmap = true;
-    Camera camera;
-    EXPECT_EQ(draw(c, Backend::cpu, camera, CpuLevel::baseline).values,
-              draw(c, Backend::cpu, camera).values);
+    shading::Camera camera;
+    EXPECT_EQ(draw(c, render::Backend::cpu, camera, CpuLevel::baseline).values,
+              draw(c, render::Backend::cpu, camera).values);
   }
 }
 
@@ -340,25 +344,25 @@ TEST(RenderRest, TriplanarOfAPlaneIsTheBoxMapping) {
       if (flip)
         c.scene.mesh.triangles = {{0, 2, 1}, {0, 3, 2}};
       c.view = axis == 0 ? "right" : axis == 1 ? "front" : "top";
-      c.scene.rest = rest_mapping(bounding_box(c.scene.mesh), 17.0);
+      c.scene.rest = texture::rest_mapping(bounding_box(c.scene.mesh), 17.0);
       c.scene.rest.triplanar = true;
-      Camera camera;
-      const Image three = draw(c, Backend::cpu, camera);
-      std::vector<Surface> surfaces(1);
+      shading::Camera camera;
+      const texture::Image three = draw(c, render::Backend::cpu, camera);
+      std::vector<shading::Surface> surfaces(1);
       surfaces[0].mesh = c.scene.mesh;
       surfaces[0].mesh.texcoords.clear();
-      add_texcoords(surfaces, {UvMapping::box, 17.0}, {});
-      DrawingOptions options = drawing_options(c.scene, camera);
+      shading::add_texcoords(surfaces, {shading::UvMapping::box, 17.0}, {});
+      shading::DrawingOptions options = drawing_options(c.scene, camera);
       options.rest = options.rest_normals = options.rest_light = false;
       options.texcoords = options.structure = true;
-      SurfaceMaterial material = material_of(c.scene);
+      texture::SurfaceMaterial material = material_of(c.scene);
       material.rest.triplanar = false;
-      PictureOptions picture;
-      picture.backend = Backend::cpu;
+      render::PictureOptions picture;
+      picture.backend = render::Backend::cpu;
       picture.width = c.width;
       picture.height = c.height;
-      const Image box =
-          make_picture(make_drawing(surfaces, options, {}), camera, material, picture, {});
+      const texture::Image box = render::make_picture(shading::make_drawing(surfaces, options, {}),
+                                                      camera, material, picture, {});
       int max = 0;
       for (std::size_t n = 0; n < box.values.size(); ++n)
         max = test::larger(max, std::abs(box.values[n] - three.values[n]));
@@ -372,31 +376,33 @@ TEST(RenderRest, ItStaysOnTissueThatMoves) {
   for (const Case& still :
        {triplanar(round_body()), noisy(round_body()), veiny(torus(60, 30, false))}) {
     Case c = still;
-    Camera camera;
-    const Image at_rest = draw(c, Backend::cpu, camera);
-    std::vector<Surface> surfaces(1);
+    shading::Camera camera;
+    const texture::Image at_rest = draw(c, render::Backend::cpu, camera);
+    std::vector<shading::Surface> surfaces(1);
     surfaces[0].mesh = c.scene.mesh;
     surfaces[0].rest = c.scene.mesh.points;
     const Vec3 away{300, 20, -50};
     for (Vec3& p : surfaces[0].mesh.points)
       p = rotated(p) + away;
-    Camera moved = camera;
+    shading::Camera moved = camera;
     moved.eye = rotated(camera.eye) + away;
     moved.target = rotated(camera.target) + away;
     moved.right = rotated(camera.right);
     moved.up = rotated(camera.up);
     moved.back = rotated(camera.back);
     c.scene.light = rotated(c.scene.light) + away;
-    const Drawing drawing = make_drawing(surfaces, drawing_options(c.scene, moved), {});
+    const shading::Drawing drawing =
+        shading::make_drawing(surfaces, drawing_options(c.scene, moved), {});
     EXPECT_EQ(drawing.turns.size(), drawing.vertices.size());
-    for (const Backend backend : {Backend::cpu, Backend::gl}) {
-      if (backend == Backend::gl && !has_gl())
+    for (const render::Backend backend : {render::Backend::cpu, render::Backend::gl}) {
+      if (backend == render::Backend::gl && !has_gl())
         continue;
-      PictureOptions picture;
+      render::PictureOptions picture;
       picture.backend = backend;
       picture.width = c.width;
       picture.height = c.height;
-      const Image image = make_picture(drawing, moved, material_of(c.scene), picture, {});
+      const texture::Image image =
+          render::make_picture(drawing, moved, material_of(c.scene), picture, {});
       std::size_t differ = 0, shown = 0;
       for (std::size_t n = 0; n < image.values.size(); ++n) {
         differ += std::abs(image.values[n] - at_rest.values[n]) > 2 ? 1U : 0U;
@@ -405,13 +411,14 @@ TEST(RenderRest, ItStaysOnTissueThatMoves) {
       EXPECT_LT(differ, shown / 100); // along outlines
     }
     // That this can fail: the turns forgotten.
-    Drawing wrong = drawing;
+    shading::Drawing wrong = drawing;
     wrong.turns.clear();
-    PictureOptions picture;
-    picture.backend = Backend::cpu;
+    render::PictureOptions picture;
+    picture.backend = render::Backend::cpu;
     picture.width = c.width;
     picture.height = c.height;
-    const Image image = make_picture(wrong, moved, material_of(c.scene), picture, {});
+    const texture::Image image =
+        render::make_picture(wrong, moved, material_of(c.scene), picture, {});
     std::size_t differ = 0;
     for (std::size_t n = 0; n < image.values.size(); ++n)
       differ += std::abs(image.values[n] - at_rest.values[n]) > 2 ? 1U : 0U;
@@ -424,10 +431,11 @@ TEST(RenderRest, TurnsAreTheRotation) {
   std::vector<Vec3> now = mesh.points;
   for (Vec3& p : now)
     p = rotated(p) * 1.5;
-  const std::vector<Vec3> n0 = area_normals(mesh.points, mesh.triangles),
-                          n1 = area_normals(now, mesh.triangles);
+  const std::vector<Vec3> n0 = shading::area_normals(mesh.points, mesh.triangles),
+                          n1 = shading::area_normals(now, mesh.triangles);
   const Vec3 x = rotated({1, 0, 0}), y = rotated({0, 1, 0});
-  for (const DrawTurn& turn : rest_turns(mesh.points, n0, now, n1, mesh.triangles))
+  for (const texture::DrawTurn& turn :
+       texture::rest_turns(mesh.points, n0, now, n1, mesh.triangles))
     for (std::size_t a = 0; a < 3; ++a) {
       EXPECT_NEAR(turn.x[a], x[static_cast<int>(a)], 1e-6);
       EXPECT_NEAR(turn.y[a], y[static_cast<int>(a)], 1e-6);
@@ -435,9 +443,9 @@ TEST(RenderRest, TurnsAreTheRotation) {
   // Turned over: opposite normals.
   for (std::size_t p = 0; p < now.size(); ++p)
     now[p] = {mesh.points[p].x, -mesh.points[p].y, -mesh.points[p].z};
-  const std::vector<DrawTurn> over =
-      rest_turns(mesh.points, n0, now, area_normals(now, mesh.triangles), mesh.triangles);
-  for (const DrawTurn& turn : over) {
+  const std::vector<texture::DrawTurn> over = texture::rest_turns(
+      mesh.points, n0, now, shading::area_normals(now, mesh.triangles), mesh.triangles);
+  for (const texture::DrawTurn& turn : over) {
     EXPECT_NEAR(turn.x[0], 1, 1e-6);
     EXPECT_NEAR(turn.y[1], -1, 1e-6);
   }
@@ -450,7 +458,7 @@ TEST(RenderRest, NoiseHasTheMomentsThatAreStated) {
     const auto one = [&] { return static_cast<double>(random()) / 4294967296.0 * 400 - 200; };
     return Vec3{one(), one(), one()};
   };
-  SolidTexture sharp = solid("veins:scale=1,octaves=1"), faded = sharp;
+  texture::SolidTexture sharp = solid("veins:scale=1,octaves=1"), faded = sharp;
   constexpr int count = 40000;
   for (int n = 0; n < count; ++n) {
     const Vec3 p = place();
@@ -471,32 +479,34 @@ TEST(RenderRest, FixedFunctionsRefuseAndAutomaticDraws) {
   if (!has_gl())
     GTEST_SKIP() << "no OpenGL";
   Case c = noisy(round_body());
-  std::vector<Surface> surfaces(1);
+  std::vector<shading::Surface> surfaces(1);
   surfaces[0].mesh = c.scene.mesh;
-  const Camera camera = make_camera({}, rest_box(surfaces), 60, 40);
-  const Drawing drawing = make_drawing(surfaces, drawing_options(c.scene, camera), {});
-  PictureOptions picture;
+  const shading::Camera camera = shading::make_camera({}, shading::rest_box(surfaces), 60, 40);
+  const shading::Drawing drawing =
+      shading::make_drawing(surfaces, drawing_options(c.scene, camera), {});
+  render::PictureOptions picture;
   picture.width = 60;
   picture.height = 40;
-  for (const GlMode mode : {GlMode::passes3, GlMode::passes2, GlMode::passes1}) {
+  for (const gl::GlMode mode : {gl::GlMode::passes3, gl::GlMode::passes2, gl::GlMode::passes1}) {
     picture.gl.mode = mode;
-    picture.backend = Backend::gl;
-    EXPECT_THROW(make_picture(drawing, camera, material_of(c.scene), picture, {}), Error);
-    picture.backend = Backend::automatic;
-    PictureReport report;
-    make_picture(drawing, camera, material_of(c.scene), picture, {}, &report);
-    EXPECT_EQ(report.backend, Backend::cpu);
+    picture.backend = render::Backend::gl;
+    EXPECT_THROW(render::make_picture(drawing, camera, material_of(c.scene), picture, {}), Error);
+    picture.backend = render::Backend::automatic;
+    render::PictureReport report;
+    render::make_picture(drawing, camera, material_of(c.scene), picture, {}, &report);
+    EXPECT_EQ(report.backend, render::Backend::cpu);
     EXPECT_FALSE(report.gl_failure.empty());
   }
 }
 
 TEST(SolidTexture, WrongTextsAreErrors) {
-  EXPECT_TRUE(is_solid_texture("noise"));
-  EXPECT_TRUE(is_solid_texture("veins:x"));
-  EXPECT_FALSE(is_solid_texture("noise.png"));
-  EXPECT_FALSE(is_solid_texture("./noise"));
-  const SolidTexture all = solid("veins:scale=2.5,octaves=12,seed=4294967295,roughness=1,width=0.2,"
-                                 "ground=0/0.5/1,color=1/1/0");
+  EXPECT_TRUE(texture::is_solid_texture("noise"));
+  EXPECT_TRUE(texture::is_solid_texture("veins:x"));
+  EXPECT_FALSE(texture::is_solid_texture("noise.png"));
+  EXPECT_FALSE(texture::is_solid_texture("./noise"));
+  const texture::SolidTexture all =
+      solid("veins:scale=2.5,octaves=12,seed=4294967295,roughness=1,width=0.2,"
+            "ground=0/0.5/1,color=1/1/0");
   EXPECT_EQ(all.scale, 2.5);
   EXPECT_EQ(all.octaves, 12);
   EXPECT_EQ(all.seed, 4294967295U);
@@ -526,4 +536,4 @@ TEST(SolidTexture, WrongTextsAreErrors) {
 }
 
 } // namespace
-} // namespace gewebe
+} // namespace gewebe::test

@@ -18,31 +18,31 @@
 #include <optional>
 #include <utility>
 
-namespace gewebe {
+namespace gewebe::test {
 namespace {
 
-Model ball_model() {
+model::Model ball_model() {
   TriangleMesh mesh = test::ball(1, 10);
-  return build_model(mesh, {}, {}).model;
+  return model::build_model(mesh, {}, {}).model;
 }
 
-std::vector<Surface> read(const std::string& path, SurfaceReadOptions options,
-                          SolidReport* solid = nullptr) {
-  Input input(path);
-  options.kind = input_kind(input.peek(4096), path, "");
-  return read_surfaces(input, options, {}, solid);
+std::vector<shading::Surface> read(const std::string& path, cli::SurfaceReadOptions options,
+                                   cli::SolidReport* solid = nullptr) {
+  formats::Input input(path);
+  options.kind = formats::input_kind(input.peek(4096), path, "");
+  return cli::read_surfaces(input, options, {}, solid);
 }
 
 TEST(RenderSurfaceFile, ModelsAreDrawnWithoutTheirCentralNodes) {
-  const Model model = ball_model();
+  const model::Model model = ball_model();
   const ScratchFile file(".ela");
-  std::ofstream(file.path()) << ela_text(model);
-  const std::vector<Surface> surfaces = read(file.path(), {});
+  std::ofstream(file.path()) << formats::ela_text(model);
+  const std::vector<shading::Surface> surfaces = read(file.path(), {});
   ASSERT_EQ(surfaces.size(), 1U);
-  EXPECT_EQ(surfaces[0].mesh.points.size(), surface_count(model));
+  EXPECT_EQ(surfaces[0].mesh.points.size(), model::surface_count(model));
   EXPECT_EQ(surfaces[0].mesh.triangles, model.triangles);
   EXPECT_TRUE(surfaces[0].rest.empty());
-  SurfaceReadOptions options;
+  cli::SurfaceReadOptions options;
   options.frame = 0;
   EXPECT_THROW((void)read(file.path(), options), UsageError);
   options = {};
@@ -51,28 +51,29 @@ TEST(RenderSurfaceFile, ModelsAreDrawnWithoutTheirCentralNodes) {
 }
 
 TEST(RenderSurfaceFile, FramesOfARunComeWithTheirRest) {
-  const Model model = ball_model();
+  const model::Model model = ball_model();
   const std::size_t n = model.nodes.size();
   const ScratchFile file(".h5");
   {
-    const std::unique_ptr<ResultWriter> writer = open_result(Kind::hdf5, file.path(), {});
+    const std::unique_ptr<formats::ResultWriter> writer =
+        formats::open_result(formats::Kind::hdf5, file.path(), {});
     writer->add_object("one", model);
     writer->add_object("two", model);
     for (int frame = 0; frame < 3; ++frame) {
       const std::vector<double> still(3 * n, 0.0), moved(3 * n, 0.5 * frame);
-      const std::vector<FrameObject> objects{{still, {}}, {moved, {}}};
+      const std::vector<formats::FrameObject> objects{{still, {}}, {moved, {}}};
       writer->add_frame(frame, objects);
     }
     writer->commit();
   }
-  const std::vector<Surface> last = read(file.path(), {});
+  const std::vector<shading::Surface> last = read(file.path(), {});
   ASSERT_EQ(last.size(), 2U);
   EXPECT_EQ(last[0].mesh.points, last[0].rest);
   EXPECT_EQ(last[1].mesh.points[3], (last[1].rest[3] + Vec3{1, 1, 1}));
-  SurfaceReadOptions options;
+  cli::SurfaceReadOptions options;
   options.object = "two";
   options.frame = 1;
-  const std::vector<Surface> chosen = read(file.path(), options);
+  const std::vector<shading::Surface> chosen = read(file.path(), options);
   ASSERT_EQ(chosen.size(), 1U);
   EXPECT_EQ(chosen[0].mesh.points[3], (chosen[0].rest[3] + Vec3{0.5, 0.5, 0.5}));
   options.frame = 3;
@@ -84,7 +85,7 @@ TEST(RenderSurfaceFile, FramesOfARunComeWithTheirRest) {
   options.unit = "cm";
   EXPECT_THROW((void)read(file.path(), options), UsageError);
   // The picture fits the shape at rest, wherever the tissue went.
-  EXPECT_EQ(rest_box(last).max, rest_box(chosen).max);
+  EXPECT_EQ(shading::rest_box(last).max, shading::rest_box(chosen).max);
   const std::string path = file.path();
   (void)std::remove((path.substr(0, path.size() - 3) + ".xdmf").c_str());
 }
@@ -92,13 +93,14 @@ TEST(RenderSurfaceFile, FramesOfARunComeWithTheirRest) {
 // A file of each kind, given up with both of TetGen's.
 class SolidFile {
 public:
-  SolidFile(const TetMesh& mesh, Kind kind, const std::string& suffix) : file_(suffix) {
-    Output::Options options;
-    options.binary = is_binary(kind);
-    Output output(file_.path(), options);
-    write_tet_mesh(output, mesh, kind, options);
+  SolidFile(const tetrahedra::TetMesh& mesh, formats::Kind kind, const std::string& suffix)
+      : file_(suffix) {
+    formats::Output::Options options;
+    options.binary = formats::is_binary(kind);
+    formats::Output output(file_.path(), options);
+    formats::write_tet_mesh(output, mesh, kind, options);
     output.commit();
-    if (kind == Kind::tetgen)
+    if (kind == formats::Kind::tetgen)
       beside_ = file_.path().substr(0, file_.path().size() - suffix.size()) + ".ele";
   }
   ~SolidFile() {
@@ -115,15 +117,15 @@ private:
 };
 
 TEST(RenderSurfaceFile, TetrahedraAreDrawnByTheirBoundary) {
-  const TetMesh mesh = test::odd_tetrahedra(false, true);
-  const TriangleMesh outside = boundary(mesh).mesh;
+  const tetrahedra::TetMesh mesh = test::odd_tetrahedra(false, true);
+  const TriangleMesh outside = tetrahedra::boundary(mesh).mesh;
   for (const auto& [kind, suffix] :
-       {std::pair(Kind::ply, ".ply"), std::pair(Kind::vtu, ".vtu"), std::pair(Kind::msh, ".msh"),
-        std::pair(Kind::msh4, ".msh"), std::pair(Kind::medit, ".mesh"),
-        std::pair(Kind::tetgen, ".node")}) {
+       {std::pair(formats::Kind::ply, ".ply"), std::pair(formats::Kind::vtu, ".vtu"),
+        std::pair(formats::Kind::msh, ".msh"), std::pair(formats::Kind::msh4, ".msh"),
+        std::pair(formats::Kind::medit, ".mesh"), std::pair(formats::Kind::tetgen, ".node")}) {
     const SolidFile file(mesh, kind, suffix);
-    SolidReport report;
-    const std::vector<Surface> surfaces = read(file.path(), {}, &report);
+    cli::SolidReport report;
+    const std::vector<shading::Surface> surfaces = read(file.path(), {}, &report);
     ASSERT_EQ(surfaces.size(), 1U);
     EXPECT_EQ(surfaces[0].mesh.points, outside.points) << suffix;
     EXPECT_EQ(surfaces[0].mesh.triangles, outside.triangles);
@@ -131,25 +133,26 @@ TEST(RenderSurfaceFile, TetrahedraAreDrawnByTheirBoundary) {
     EXPECT_TRUE(surfaces[0].rest.empty() && surfaces[0].mesh.part.empty());
     EXPECT_EQ(report.tetrahedra, mesh.tetrahedra.size());
     EXPECT_EQ(report.curved_edges, 0U);
-    SurfaceReadOptions options;
+    cli::SurfaceReadOptions options;
     options.unit = "cm";
     EXPECT_EQ(read(file.path(), options)[0].mesh.points[3], outside.points[3] * 10);
     options.frame = 0;
     EXPECT_THROW((void)read(file.path(), options), UsageError);
   }
-  TetMesh quadratic = test::odd_tetrahedra(true, true);
+  tetrahedra::TetMesh quadratic = test::odd_tetrahedra(true, true);
   quadratic.points[quadratic.middles[0][0]] += Vec3{0, 0, 0.01};
-  SolidReport report;
-  EXPECT_EQ(read(SolidFile(quadratic, Kind::vtu, ".vtu").path(), {}, &report)[0].mesh.triangles,
-            outside.triangles);
+  cli::SolidReport report;
+  EXPECT_EQ(
+      read(SolidFile(quadratic, formats::Kind::vtu, ".vtu").path(), {}, &report)[0].mesh.triangles,
+      outside.triangles);
   EXPECT_EQ(report.curved_edges, 1U);
 }
 
 TEST(RenderSurfaceFile, TheCutIsAPartWithPointsOfItsOwn) {
-  const SolidFile file(test::box_tetrahedra(2, 3, 4), Kind::vtu, ".vtu");
-  SurfaceReadOptions options;
-  options.clip = ClipPlane{{0, 0, 1.5}, {0, 0, 2}};
-  SolidReport report;
+  const SolidFile file(test::box_tetrahedra(2, 3, 4), formats::Kind::vtu, ".vtu");
+  cli::SurfaceReadOptions options;
+  options.clip = tetrahedra::ClipPlane{{0, 0, 1.5}, {0, 0, 2}};
+  cli::SolidReport report;
   const TriangleMesh mesh = read(file.path(), options, &report)[0].mesh;
   check_mesh(mesh);
   EXPECT_EQ(report.tetrahedra, 144U);
@@ -171,28 +174,29 @@ TEST(RenderSurfaceFile, TheCutIsAPartWithPointsOfItsOwn) {
   EXPECT_EQ(report.cut_triangles, cut);
   for (const int of : parts)
     EXPECT_TRUE(of == 1 || of == 2) << of;
-  options.clip = ClipPlane{{0, 0, 1.5}, {0, 0, 0}};
+  options.clip = tetrahedra::ClipPlane{{0, 0, 1.5}, {0, 0, 0}};
   EXPECT_THROW((void)read(file.path(), options), Error);
-  options.clip = ClipPlane{{0, 0, 0}, {0, 0, 1}};
+  options.clip = tetrahedra::ClipPlane{{0, 0, 0}, {0, 0, 1}};
   EXPECT_THROW((void)read(file.path(), options), Error); // takes all away
-  options.clip = ClipPlane{{0, 0, 4}, {0, 0, 1}};
+  options.clip = tetrahedra::ClipPlane{{0, 0, 4}, {0, 0, 1}};
   EXPECT_EQ(read(file.path(), options, &report)[0].mesh.triangles.size(), 104U);
   EXPECT_EQ(report.tetrahedra_cut + report.tetrahedra_removed + report.cut_triangles, 0U);
   const ScratchFile model(".ela");
-  std::ofstream(model.path()) << ela_text(ball_model());
+  std::ofstream(model.path()) << formats::ela_text(ball_model());
   EXPECT_THROW((void)read(model.path(), options), UsageError);
 }
 
 TEST(RenderSurfaceFile, BrokenTetrahedraAreNotDrawn) {
-  TetMesh mesh = test::box_tetrahedra(1, 1, 1);
+  tetrahedra::TetMesh mesh = test::box_tetrahedra(1, 1, 1);
   std::swap(mesh.tetrahedra[2][0], mesh.tetrahedra[2][1]);
-  for (const auto& clip : {std::optional<ClipPlane>(), std::optional(ClipPlane{{}, {0, 0, -1}})}) {
-    SurfaceReadOptions options;
+  for (const auto& clip : {std::optional<tetrahedra::ClipPlane>(),
+                           std::optional(tetrahedra::ClipPlane{{}, {0, 0, -1}})}) {
+    cli::SurfaceReadOptions options;
     options.clip = clip;
-    EXPECT_THROW((void)read(SolidFile(mesh, Kind::vtu, ".vtu").path(), options), Error);
-    EXPECT_THROW((void)read(SolidFile({}, Kind::vtu, ".vtu").path(), options), Error);
+    EXPECT_THROW((void)read(SolidFile(mesh, formats::Kind::vtu, ".vtu").path(), options), Error);
+    EXPECT_THROW((void)read(SolidFile({}, formats::Kind::vtu, ".vtu").path(), options), Error);
   }
 }
 
 } // namespace
-} // namespace gewebe
+} // namespace gewebe::test

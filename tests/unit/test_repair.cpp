@@ -17,7 +17,7 @@
 #include <string>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::test {
 namespace {
 
 const TriangleMesh& whole_sphere() {
@@ -31,7 +31,7 @@ TriangleMesh with_hole() {
   std::erase_if(mesh.triangles, [&](const Triangle& t) {
     return std::any_of(t.begin(), t.end(), [&](std::uint32_t c) { return c == a || c == b; });
   });
-  weld(mesh, {Weld::none, false, true});
+  repair::weld(mesh, {repair::Weld::none, false, true});
   return mesh;
 }
 
@@ -69,15 +69,15 @@ TriangleMesh with_crack() {
   return mesh;
 }
 
-std::uint64_t total(const RepairReport& report) {
+std::uint64_t total(const repair::RepairReport& report) {
   std::uint64_t sum = 0;
-  for (const RepairReport::Line& line : report.lines())
+  for (const repair::RepairReport::Line& line : report.lines())
     sum += line.count;
   return sum;
 }
 
 void expect_sound(const TriangleMesh& mesh, const std::string& what) {
-  const MeshReport report = examine_mesh(mesh);
+  const mesh::MeshReport report = mesh::examine_mesh(mesh);
   EXPECT_TRUE(report.closed() && report.manifold() && report.oriented() && report.outward())
       << what;
   EXPECT_EQ(report.euler, 2) << what;
@@ -88,16 +88,16 @@ void expect_sound(const TriangleMesh& mesh, const std::string& what) {
 struct Fault {
   const char* word;
   TriangleMesh mesh;
-  std::uint64_t RepairReport::*count;
+  std::uint64_t repair::RepairReport::*count;
   std::uint64_t faults = 1;
 };
 std::vector<Fault> faults() {
-  return {{"weld", with_crack(), &RepairReport::welded_points},
-          {"duplicates", with_duplicate(), &RepairReport::duplicate_faces},
-          {"orientation", with_flipped_face(), &RepairReport::turned_faces},
-          {"degenerate", with_flat_face(0.4), &RepairReport::degenerate_faces},
-          {"degenerate", with_flat_face(5e-5), &RepairReport::degenerate_faces, 2},
-          {"holes", with_hole(), &RepairReport::holes}};
+  return {{"weld", with_crack(), &repair::RepairReport::welded_points},
+          {"duplicates", with_duplicate(), &repair::RepairReport::duplicate_faces},
+          {"orientation", with_flipped_face(), &repair::RepairReport::turned_faces},
+          {"degenerate", with_flat_face(0.4), &repair::RepairReport::degenerate_faces},
+          {"degenerate", with_flat_face(5e-5), &repair::RepairReport::degenerate_faces, 2},
+          {"holes", with_hole(), &repair::RepairReport::holes}};
 }
 
 TEST(Repair, EachWordMendsItsOwnFaultAndLeavesTheOthersAlone) {
@@ -106,7 +106,8 @@ TEST(Repair, EachWordMendsItsOwnFaultAndLeavesTheOthersAlone) {
     for (const char* const word : {"weld", "duplicates", "orientation", "degenerate", "holes"}) {
       const std::string what = std::string(word) + " of " + fault.word;
       TriangleMesh mesh = fault.mesh;
-      const RepairReport report = repair_mesh(mesh, parse_repair(word), Context{});
+      const repair::RepairReport report =
+          repair::repair_mesh(mesh, repair::parse_repair(word), Context{});
       if (std::string(word) == fault.word) {
         EXPECT_EQ(report.*fault.count, fault.faults) << what;
         expect_sound(mesh, what);
@@ -129,17 +130,18 @@ TEST(Repair, AllMendsAllAtOnceAndASecondTimeNothing) {
       p.x += x;
     test::append(mesh, moved);
   }
-  const RepairReport report = repair_mesh(mesh, parse_repair("all,weld:1e-4"), Context{});
+  const repair::RepairReport report =
+      repair::repair_mesh(mesh, repair::parse_repair("all,weld:1e-4"), Context{});
   EXPECT_EQ(report.welded_points, 1U + 1U); // the crack, and the short edge
   EXPECT_EQ(report.duplicate_faces, 1U);
   EXPECT_EQ(report.turned_faces, 1U);
   EXPECT_EQ(report.degenerate_faces, 1U);
   EXPECT_EQ(report.holes, 1U);
-  const MeshReport after = examine_mesh(mesh);
+  const mesh::MeshReport after = mesh::examine_mesh(mesh);
   EXPECT_TRUE(after.closed() && after.manifold() && after.outward());
   EXPECT_EQ(after.components, faults().size());
   const TriangleMesh before = mesh;
-  EXPECT_EQ(total(repair_mesh(mesh, parse_repair("all"), Context{})), 0U);
+  EXPECT_EQ(total(repair::repair_mesh(mesh, repair::parse_repair("all"), Context{})), 0U);
   EXPECT_EQ(mesh.points, before.points);
   EXPECT_EQ(mesh.triangles, before.triangles);
 }
@@ -150,7 +152,8 @@ TEST(Repair, AFilledHoleIsLikeItsSurroundings) {
   mesh.material.assign(mesh.triangles.size(), 2);
   mesh.texcoords.assign(mesh.triangles.size(), {0.25F, 0.5F, 0.25F, 0.5F, 0.25F, 0.5F});
   const std::size_t faces = mesh.triangles.size();
-  const RepairReport report = repair_mesh(mesh, parse_repair("holes"), Context{});
+  const repair::RepairReport report =
+      repair::repair_mesh(mesh, repair::parse_repair("holes"), Context{});
   EXPECT_EQ(report.hole_faces, mesh.triangles.size() - faces);
   EXPECT_EQ(mesh.part, std::vector<std::int32_t>(mesh.triangles.size(), 3));
   EXPECT_EQ(mesh.material, std::vector<std::int32_t>(mesh.triangles.size(), 2));
@@ -162,16 +165,17 @@ TEST(Repair, AFilledHoleIsLikeItsSurroundings) {
 
 TEST(Repair, HolesAreFilledUpToTheirSize) {
   TriangleMesh mesh = with_hole(); // of eight edges
-  RepairReport report = repair_mesh(mesh, parse_repair("holes:7"), Context{});
+  repair::RepairReport report =
+      repair::repair_mesh(mesh, repair::parse_repair("holes:7"), Context{});
   EXPECT_EQ(report.holes, 0U);
   EXPECT_EQ(report.holes_left, 1U);
   EXPECT_EQ(mesh.triangles, with_hole().triangles);
-  report = repair_mesh(mesh, parse_repair("holes:8"), Context{});
+  report = repair::repair_mesh(mesh, repair::parse_repair("holes:8"), Context{});
   EXPECT_EQ(report.holes, 1U);
   TriangleMesh alone;
   alone.points = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}};
   alone.triangles = {{0, 1, 2}};
-  EXPECT_EQ(repair_mesh(alone, parse_repair("all"), Context{}).holes_left, 1U);
+  EXPECT_EQ(repair::repair_mesh(alone, repair::parse_repair("all"), Context{}).holes_left, 1U);
   EXPECT_EQ(alone.triangles.size(), 1U);
 }
 
@@ -190,14 +194,14 @@ TriangleMesh bent_cone(std::uint32_t edges) {
 }
 
 TEST(Repair, HolesThatWouldBeSearchedForMinutesAreLeft) {
-  RepairOptions options = parse_repair("holes");
+  repair::RepairOptions options = repair::parse_repair("holes");
   TriangleMesh mesh = bent_cone(100);
-  RepairReport report = repair_mesh(mesh, options, Context{});
+  repair::RepairReport report = repair::repair_mesh(mesh, options, Context{});
   EXPECT_EQ(report.holes, 1U);
   EXPECT_EQ(report.holes_bent, 0U);
-  EXPECT_TRUE(examine_mesh(mesh).closed());
+  EXPECT_TRUE(mesh::examine_mesh(mesh).closed());
   mesh = bent_cone(static_cast<std::uint32_t>(options.searched_edges) + 1);
-  report = repair_mesh(mesh, options, Context{});
+  report = repair::repair_mesh(mesh, options, Context{});
   EXPECT_EQ(report.holes, 0U);
   EXPECT_EQ(report.holes_left, 1U);
   EXPECT_EQ(report.holes_bent, 1U);
@@ -210,7 +214,7 @@ TEST(Repair, HolesThatWouldBeSearchedForMinutesAreLeft) {
     test::append(mesh, one);
   }
   options.searched_edges = 300;
-  report = repair_mesh(mesh, options, Context{});
+  report = repair::repair_mesh(mesh, options, Context{});
   EXPECT_EQ(report.holes, 3U); // 300³ / 200³
   EXPECT_EQ(report.holes_bent, 2U);
   // A long border alone is none.
@@ -221,9 +225,9 @@ TEST(Repair, HolesThatWouldBeSearchedForMinutesAreLeft) {
     mesh.points.push_back({30 * std::cos(angle), 30 * std::sin(angle), 5 * std::sin(7 * angle)});
     mesh.triangles.push_back({0, 1 + n, 1 + (n + 1) % 10000});
   }
-  report = repair_mesh(mesh, parse_repair("holes"), Context{});
+  report = repair::repair_mesh(mesh, repair::parse_repair("holes"), Context{});
   EXPECT_EQ(report.holes, 1U);
-  EXPECT_TRUE(examine_mesh(mesh).closed());
+  EXPECT_TRUE(mesh::examine_mesh(mesh).closed());
 }
 
 /// Double cones side by side, so high that all faces are needles, their faces in any order.
@@ -249,7 +253,8 @@ TEST(Repair, FacesThatMeetInAPointCostWhatTheyDoElsewhere) {
   for (const bool together : {false, true}) {
     TriangleMesh mesh = together ? double_cones(1, 4000, 1000) : double_cones(8, 500, 10000);
     const double volume = signed_volume(mesh);
-    const RepairReport report = repair_mesh(mesh, parse_repair("all"), Context{});
+    const repair::RepairReport report =
+        repair::repair_mesh(mesh, repair::parse_repair("all"), Context{});
     EXPECT_EQ(report.degenerate_faces, 8000U);
     EXPECT_EQ(report.degenerate_left, 0U);
     const std::size_t gone = 8000 - mesh.triangles.size();
@@ -257,7 +262,7 @@ TEST(Repair, FacesThatMeetInAPointCostWhatTheyDoElsewhere) {
     // An edge that goes takes two faces with it, and has few neighbours, but for one at the tips.
     EXPECT_GE(report.neighbours_asked, gone);
     EXPECT_LE(report.neighbours_asked, 8 * gone) << together;
-    const MeshReport after = examine_mesh(mesh);
+    const mesh::MeshReport after = mesh::examine_mesh(mesh);
     EXPECT_TRUE(after.closed() && after.manifold() && after.outward());
     EXPECT_NEAR(signed_volume(mesh), volume, 1e-3 * volume);
   }
@@ -268,11 +273,12 @@ TEST(Repair, SheetsThatMeetInAnEdgeStayJoinedAndAreNoHoles) {
   TriangleMesh mesh;
   mesh.points = {{0, 0, 0}, {0, 0, 4}, {5, 0, 2}, {-3, 4, 2}, {-3, -4, 2}, {2.5, 0, 1}};
   mesh.triangles = {{0, 5, 1}, {5, 2, 1}, {0, 2, 5}, {0, 1, 3}, {1, 0, 4}};
-  const RepairReport report = repair_mesh(mesh, parse_repair("degenerate,holes"), Context{});
+  const repair::RepairReport report =
+      repair::repair_mesh(mesh, repair::parse_repair("degenerate,holes"), Context{});
   EXPECT_EQ(report.degenerate_faces, 1U);
   EXPECT_EQ(report.holes, 0U);
   EXPECT_GT(report.holes_left, 0U);
-  const MeshReport after = examine_mesh(mesh);
+  const mesh::MeshReport after = mesh::examine_mesh(mesh);
   EXPECT_EQ(after.nonmanifold_edges, 1U);
   EXPECT_EQ(after.components, 1U);
 }
@@ -286,8 +292,8 @@ TEST(Repair, WeldKeepsClosedPartsApartAndJoinsPatches) {
   for (std::size_t p = whole_sphere().points.size(); p < two.points.size(); ++p)
     two.points[p].x += 1e-7;
   TriangleMesh mesh = two;
-  EXPECT_EQ(repair_mesh(mesh, parse_repair("weld"), Context{}).welded_points, 0U);
-  EXPECT_EQ(examine_mesh(mesh).components, 2U);
+  EXPECT_EQ(repair::repair_mesh(mesh, repair::parse_repair("weld"), Context{}).welded_points, 0U);
+  EXPECT_EQ(mesh::examine_mesh(mesh).components, 2U);
 
   // One ball in two patches with points of their own, a rounding apart.
   TriangleMesh patches = whole_sphere();
@@ -306,9 +312,10 @@ TEST(Repair, WeldKeepsClosedPartsApartAndJoinsPatches) {
       corner = copy[corner];
     }
   }
-  EXPECT_GT(examine_mesh(patches).boundary_edges, 0U);
-  EXPECT_GT(repair_mesh(patches, parse_repair("weld"), Context{}).welded_points, 0U);
-  const MeshReport joined = examine_mesh(patches);
+  EXPECT_GT(mesh::examine_mesh(patches).boundary_edges, 0U);
+  EXPECT_GT(repair::repair_mesh(patches, repair::parse_repair("weld"), Context{}).welded_points,
+            0U);
+  const mesh::MeshReport joined = mesh::examine_mesh(patches);
   EXPECT_TRUE(joined.closed() && joined.manifold());
   EXPECT_EQ(joined.components, 1U);
 }
@@ -323,7 +330,8 @@ TEST(Repair, WeldReachesAsFarAsItsDistance) {
       const std::uint32_t from = mesh.triangles[3][0];
       mesh.points.push_back(mesh.points[from] + out * (0.01 * part));
       mesh.triangles[3][0] = static_cast<std::uint32_t>(mesh.points.size() - 1);
-      const RepairReport report = repair_mesh(mesh, parse_repair("weld:0.01"), Context{});
+      const repair::RepairReport report =
+          repair::repair_mesh(mesh, repair::parse_repair("weld:0.01"), Context{});
       EXPECT_EQ(report.welded_points, part < 1 ? 1U : 0U) << seed;
     }
   }
@@ -349,7 +357,8 @@ TEST(Repair, WhatBelongsToFacesStaysWithThem) {
     for (std::size_t c = 0; c < 3; ++c)
       mesh.texcoords.back()[2 * c + 1] = mark(mesh, t, c) / 2;
   }
-  const RepairReport report = repair_mesh(mesh, parse_repair("duplicates,orientation"), Context{});
+  const repair::RepairReport report =
+      repair::repair_mesh(mesh, repair::parse_repair("duplicates,orientation"), Context{});
   EXPECT_EQ(report.duplicate_faces, 2U);
   EXPECT_EQ(report.turned_faces, 2U);
   ASSERT_EQ(mesh.triangles.size(), whole_sphere().triangles.size());
@@ -371,32 +380,35 @@ TEST(Repair, OrientationTurnsWholePartsOutwardAndCavitiesInward) {
   test::append(mesh, inner); // a cavity, but facing outward
   const auto faces = static_cast<std::ptrdiff_t>(whole_sphere().triangles.size());
   TriangleMesh one = mesh;
-  EXPECT_EQ(repair_mesh(one, parse_repair("orientation"), Context{}).turned_faces,
+  EXPECT_EQ(repair::repair_mesh(one, repair::parse_repair("orientation"), Context{}).turned_faces,
             inner.triangles.size());
-  EXPECT_TRUE(examine_mesh(one).outward());
+  EXPECT_TRUE(mesh::examine_mesh(one).outward());
   // As parts both are solids.
   mesh.part.assign(mesh.triangles.size(), 0);
   std::fill(mesh.part.begin() + faces, mesh.part.end(), 1);
-  EXPECT_EQ(repair_mesh(mesh, parse_repair("orientation"), Context{}).turned_faces, 0U);
+  EXPECT_EQ(repair::repair_mesh(mesh, repair::parse_repair("orientation"), Context{}).turned_faces,
+            0U);
   for (Triangle& t : mesh.triangles)
     std::swap(t[0], t[1]);
-  EXPECT_EQ(repair_mesh(mesh, parse_repair("orientation"), Context{}).turned_faces,
+  EXPECT_EQ(repair::repair_mesh(mesh, repair::parse_repair("orientation"), Context{}).turned_faces,
             mesh.triangles.size());
 }
 
 TEST(Repair, UnderstandsWordsAndRefusesOthers) {
-  EXPECT_EQ(parse_repair(""), RepairOptions{});
-  EXPECT_EQ(parse_repair("all"), parse_repair("weld,duplicates,orientation,degenerate,holes"));
-  EXPECT_EQ(parse_repair("all,weld:0.5").weld, 0.5);
-  EXPECT_EQ(parse_repair("weld:0.5,all").weld, 0.5);
-  EXPECT_EQ(parse_repair("holes:12,all").holes, 12U);
-  EXPECT_EQ(parse_repair("all,holes:12").holes, 12U);
+  EXPECT_EQ(repair::parse_repair(""), repair::RepairOptions{});
+  EXPECT_EQ(repair::parse_repair("all"),
+            repair::parse_repair("weld,duplicates,orientation,degenerate,holes"));
+  EXPECT_EQ(repair::parse_repair("all,weld:0.5").weld, 0.5);
+  EXPECT_EQ(repair::parse_repair("weld:0.5,all").weld, 0.5);
+  EXPECT_EQ(repair::parse_repair("holes:12,all").holes, 12U);
+  EXPECT_EQ(repair::parse_repair("all,holes:12").holes, 12U);
   for (const char* const text :
        {"wled", "all,", ",all", "weld:", "weld:0", "weld:-1", "weld:nan", "weld:inf", "weld:1x",
         "holes:2.5", "holes:0", "all:3", "duplicates:1", "holes:1e300"})
-    EXPECT_THROW((void)parse_repair(text), Error) << text;
+    EXPECT_THROW((void)repair::parse_repair(text), Error) << text;
   TriangleMesh mesh = whole_sphere();
-  EXPECT_THROW((void)repair_mesh(mesh, parse_repair("weld:1e-300"), Context{}), Error);
+  EXPECT_THROW((void)repair::repair_mesh(mesh, repair::parse_repair("weld:1e-300"), Context{}),
+               Error);
 }
 
 TEST(Repair, OfDirtyOrgans) {
@@ -406,19 +418,19 @@ TEST(Repair, OfDirtyOrgans) {
     TriangleMesh mesh = test::load_test_mesh(name);
     if (mesh.triangles.empty())
       GTEST_SKIP() << "no " << name;
-    const MeshReport before = examine_mesh(mesh);
-    RepairReport report = repair_mesh(mesh, parse_repair("all"), Context{});
-    const MeshReport after = examine_mesh(mesh);
+    const mesh::MeshReport before = mesh::examine_mesh(mesh);
+    repair::RepairReport report = repair::repair_mesh(mesh, repair::parse_repair("all"), Context{});
+    const mesh::MeshReport after = mesh::examine_mesh(mesh);
     EXPECT_GE(report.duplicate_faces, before.duplicate_faces) << name;
     EXPECT_GT(report.holes, 0U) << name;
     EXPECT_EQ(after.duplicate_faces, 0U) << name;
     EXPECT_LT(after.boundary_edges, before.boundary_edges) << name;
     EXPECT_LE(after.misoriented_edges, before.misoriented_edges) << name;
     EXPECT_EQ(after.unused_points, 0U) << name;
-    report = repair_mesh(mesh, parse_repair("duplicates,orientation"), Context{});
+    report = repair::repair_mesh(mesh, repair::parse_repair("duplicates,orientation"), Context{});
     EXPECT_EQ(report.duplicate_faces, 0U) << name;
   }
 }
 
 } // namespace
-} // namespace gewebe
+} // namespace gewebe::test

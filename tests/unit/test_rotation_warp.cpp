@@ -24,61 +24,62 @@
 #include <utility>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::test {
 namespace {
 
 /// A beam 100 × 30 × 30 along x, held at x = 0.
 struct Beam {
-  TetMesh mesh;
-  std::vector<SolidMaterial> materials;
-  std::vector<SolidElement> elements;
+  tetrahedra::TetMesh mesh;
+  std::vector<fem::SolidMaterial> materials;
+  std::vector<fem::SolidElement> elements;
   std::vector<std::uint8_t> fixed;
-  StiffnessMatrix matrix;
-  Factor factor;
-  RotationWarp warp;
+  linalg::StiffnessMatrix matrix;
+  linalg::Factor factor;
+  statics::RotationWarp warp;
 
-  Beam(std::uint32_t across, bool quadratic, const SolidMaterial& material)
+  Beam(std::uint32_t across, bool quadratic, const fem::SolidMaterial& material)
       : mesh(made(across, quadratic)), materials{material},
-        elements(solid_elements(mesh, materials)), fixed(held(mesh)),
-        matrix(solid_stiffness(mesh, elements, fixed)), factor(matrix, {}),
+        elements(fem::solid_elements(mesh, materials)), fixed(held(mesh)),
+        matrix(fem::solid_stiffness(mesh, elements, fixed)), factor(matrix, {}),
         warp(mesh, elements, fixed, solve()) {}
   Beam(const Beam&) = delete;
   Beam& operator=(const Beam&) = delete;
-  WarpSolve solve() const {
+  statics::WarpSolve solve() const {
     return [this](std::span<double> over_axes) {
       const std::vector<double> load(over_axes.begin(), over_axes.end());
-      solve_axes(matrix, factor, load, over_axes);
+      linalg::solve_axes(matrix, factor, load, over_axes);
     };
   }
-  WarpColumns columns(std::span<const std::uint32_t> nodes) const {
-    WarpColumns columns(warp.surface().nodes().size());
+  statics::WarpColumns columns(std::span<const std::uint32_t> nodes) const {
+    statics::WarpColumns columns(warp.surface().nodes().size());
     columns.set(nodes, [&](std::uint32_t node, std::span<double> of_node) {
       warp.column_of(node, of_node);
     });
     return columns;
   }
   /// Under a whole load.
-  WarpState shape(std::vector<double> load, const WarpOptions& options = {},
-                  WarpState start = {}) const {
+  statics::WarpState shape(std::vector<double> load, const statics::WarpOptions& options = {},
+                           statics::WarpState start = {}) const {
     return shape_of(warp, std::move(load), options, std::move(start));
   }
-  static WarpState shape_of(const RotationWarp& warp, std::vector<double> load,
-                            const WarpOptions& options = {}, WarpState start = {}) {
-    const WarpColumns none(warp.surface().nodes().size());
-    const WarpWholeLoad whole = warp.whole_load(std::move(load));
+  static statics::WarpState shape_of(const statics::RotationWarp& warp, std::vector<double> load,
+                                     const statics::WarpOptions& options = {},
+                                     statics::WarpState start = {}) {
+    const statics::WarpColumns none(warp.surface().nodes().size());
+    const statics::WarpWholeLoad whole = warp.whole_load(std::move(load));
     warp.answer({.columns = none, .whole = &whole}, start, options);
     return start;
   }
-  static TetMesh made(std::uint32_t across, bool quadratic) {
+  static tetrahedra::TetMesh made(std::uint32_t across, bool quadratic) {
     const std::uint32_t along = across * 10 / 3;
-    TetMesh mesh = test::box_tetrahedra(along, across, across, 30.0 / across);
+    tetrahedra::TetMesh mesh = test::box_tetrahedra(along, across, across, 30.0 / across);
     for (Vec3& p : mesh.points)
       p.x *= 100 / (along * 30.0 / across);
     if (quadratic)
-      make_quadratic(mesh);
+      tetrahedra::make_quadratic(mesh);
     return mesh;
   }
-  static std::vector<std::uint8_t> held(const TetMesh& mesh) {
+  static std::vector<std::uint8_t> held(const tetrahedra::TetMesh& mesh) {
     std::vector<std::uint8_t> fixed;
     for (const Vec3& p : mesh.points)
       fixed.insert(fixed.end(), 3, p.x == 0);
@@ -86,7 +87,7 @@ struct Beam {
   }
   /// A traction on the free end, downwards or around its middle, 1 Pa and Pa/mm.
   std::vector<double> end_load(bool twist) const {
-    const TetBoundary faces = boundary(mesh);
+    const tetrahedra::TetBoundary faces = tetrahedra::boundary(mesh);
     std::vector<std::uint32_t> end;
     for (std::uint32_t k = 0; k < faces.mesh.triangles.size(); ++k) {
       const auto [a, b, c] = faces.mesh.triangles[k];
@@ -94,7 +95,7 @@ struct Beam {
           at_end(faces.mesh.points[c]))
         end.push_back(k);
     }
-    std::vector<double> load = traction_load(mesh, faces, end, {0, 0, -1});
+    std::vector<double> load = fem::traction_load(mesh, faces, end, {0, 0, -1});
     for (std::size_t i = 0; twist && i < mesh.points.size(); ++i) {
       const double share = -load[3 * i + 2];
       load[3 * i + 1] = -share * (mesh.points[i].z - 15);
@@ -116,14 +117,15 @@ struct Beam {
   }
   std::vector<double> linear(std::span<const double> load) const {
     std::vector<double> u(load.size());
-    solve_axes(matrix, factor, load, u);
+    linalg::solve_axes(matrix, factor, load, u);
     return u;
   }
-  std::vector<double> reference(const SolidVector& load, const HyperelasticLaw& law = {}) const {
-    std::vector<SolidElement> own = elements;
-    for (SolidElement& e : own)
+  std::vector<double> reference(const fit::SolidVector& load,
+                                const model::HyperelasticLaw& law = {}) const {
+    std::vector<fem::SolidElement> own = elements;
+    for (fem::SolidElement& e : own)
       e.law = law;
-    return hyperelastic_statics(mesh, own, fixed, {}, load).displacement.axes;
+    return fit::hyperelastic_statics(mesh, own, fixed, {}, load).displacement.axes;
   }
   std::vector<double> on_surface(std::span<const double> u) const {
     std::vector<double> result;
@@ -169,12 +171,12 @@ TEST(RotationWarp, BentAndTwistedBeamsAreAsNeoHookean) {
         on_nodes.insert(on_nodes.end(), {load[k], load[k + 1], load[k + 2]});
       }
     }
-    const WarpColumns columns = beam.columns(loaded);
-    const auto reference = beam.reference({load, {}}, {HyperelasticLaw::neo_hookean, {}});
+    const statics::WarpColumns columns = beam.columns(loaded);
+    const auto reference = beam.reference({load, {}}, {model::HyperelasticLaw::neo_hookean, {}});
     EXPECT_NEAR(beam.turn(reference, c.twist), c.turn, 0.6);
-    const WarpState whole = beam.shape(load);
-    WarpState by_columns;
-    const WarpLoad on_columns{.columns = columns, .forces = on_nodes};
+    const statics::WarpState whole = beam.shape(load);
+    statics::WarpState by_columns;
+    const statics::WarpLoad on_columns{.columns = columns, .forces = on_nodes};
     beam.warp.answer(on_columns, by_columns);
     EXPECT_LE(beam.error(whole.u, reference), c.whole);
     EXPECT_LE(beam.error(by_columns.u, reference), c.by_columns);
@@ -189,8 +191,8 @@ TEST(RotationWarp, BentAndTwistedBeamsAreAsNeoHookean) {
     EXPECT_GE(beam.error(beam.shape(load, {2, 0}).u, reference),
               (c.turn > 20 ? 1.1 : 0.9) * c.whole);
     // Inside as well.
-    const WarpColumns none(beam.warp.surface().nodes().size());
-    const WarpWholeLoad as_whole = beam.warp.whole_load(load);
+    const statics::WarpColumns none(beam.warp.surface().nodes().size());
+    const statics::WarpWholeLoad as_whole = beam.warp.whole_load(load);
     const auto inside = beam.warp.whole_shape(
         whole, beam.warp.whole_local({.columns = none, .whole = &as_whole}, whole));
     double worst = 0, most = 0;
@@ -222,14 +224,15 @@ TEST(RotationWarp, DisplacedNodesAreHeldByTheForcesOfNeoHookean) {
     }
   }
   ASSERT_EQ(grasped.size(), 9U);
-  const auto state = hyperelastic_statics(beam.mesh, beam.elements, fixed, prescribed,
-                                          {std::vector<double>(fixed.size()), {}});
-  const SolidVector back = hyperelastic_forces(beam.mesh, beam.elements, state.displacement);
+  const auto state = fit::hyperelastic_statics(beam.mesh, beam.elements, fixed, prescribed,
+                                               {std::vector<double>(fixed.size()), {}});
+  const fit::SolidVector back =
+      fit::hyperelastic_forces(beam.mesh, beam.elements, state.displacement);
   const auto& reference = state.displacement.axes;
-  const WarpColumns columns = beam.columns(grasped);
+  const statics::WarpColumns columns = beam.columns(grasped);
   const std::vector<std::uint8_t> held(grasped.size(), 1);
-  const WarpLoad load{.columns = columns, .held = held, .targets = targets};
-  WarpState found;
+  const statics::WarpLoad load{.columns = columns, .held = held, .targets = targets};
+  statics::WarpState found;
   beam.warp.answer(load, found, {40, 1e-6});
   EXPECT_LE(found.change, 1e-6);
   EXPECT_LE(found.rounds, 20);
@@ -249,14 +252,14 @@ TEST(RotationWarp, DisplacedNodesAreHeldByTheForcesOfNeoHookean) {
   EXPECT_LE(norm(total - expected), 0.1 * norm(expected));
   EXPECT_GE(norm(linear - expected), 3 * norm(expected)); // they stretch the beam
   // These forces give that shape again.
-  WarpState again = found;
+  statics::WarpState again = found;
   beam.warp.answer({.columns = columns, .forces = found.holding}, again, {20, 1e-6});
   EXPECT_LE(beam.error(again.u, found.u, true), 1e-4);
   // Half of the nodes held, the others pushed as they were held: the same again.
   std::vector<std::uint8_t> half(grasped.size());
   for (std::size_t n = 0; n < half.size(); n += 2)
     half[n] = 1;
-  WarpState both = found;
+  statics::WarpState both = found;
   beam.warp.answer({.columns = columns, .forces = found.holding, .held = half, .targets = targets},
                    both, {20, 1e-6});
   EXPECT_LE(both.change, 1e-6);
@@ -269,7 +272,7 @@ TEST(RotationWarp, TheComplianceIsTheChangeOfPlaces) {
   std::vector<double> weight = beam.end_load(false);
   for (double& f : weight)
     f *= 500;
-  const WarpWholeLoad whole = beam.warp.whole_load(weight);
+  const statics::WarpWholeLoad whole = beam.warp.whole_load(weight);
   std::vector<std::uint32_t> nodes;
   std::vector<std::uint8_t> held;
   for (std::uint32_t s = 0; s < beam.warp.surface().nodes().size() && nodes.size() < 6; s += 29)
@@ -277,11 +280,11 @@ TEST(RotationWarp, TheComplianceIsTheChangeOfPlaces) {
       nodes.push_back(s);
       held.push_back(nodes.size() % 3 == 0 ? 1 : 0);
     }
-  const WarpColumns columns = beam.columns(nodes);
+  const statics::WarpColumns columns = beam.columns(nodes);
   std::vector<double> targets(columns.count(), -3), forces(columns.count());
-  const WarpLoad load{
+  const statics::WarpLoad load{
       .columns = columns, .forces = forces, .held = held, .targets = targets, .whole = &whole};
-  WarpState state;
+  statics::WarpState state;
   beam.warp.answer(load, state, {40, 1e-8});
   ASSERT_LE(state.change, 1e-8);
   std::vector<std::size_t> places;
@@ -293,7 +296,7 @@ TEST(RotationWarp, TheComplianceIsTheChangeOfPlaces) {
   for (std::size_t c = 0; c < size; ++c) {
     const std::size_t column = 3 * places[c / 3] + c % 3;
     forces[column] = 1e4;
-    WarpState moved = state;
+    statics::WarpState moved = state;
     beam.warp.answer(load, moved, {40, 1e-8});
     forces[column] = 0;
     double worst = 0, most = 0;
@@ -323,9 +326,10 @@ TEST(RotationWarp, ASiliconeBeamDroopsAsMeasured) {
   const Beam beam(3, true, {263824, 0.499, 1.07e-3});
   const Vec3 gravity{0, 0, -9807.09};
   const std::vector<double> weight =
-      gravity_load(beam.mesh, beam.materials, beam.elements, gravity);
+      fem::gravity_load(beam.mesh, beam.materials, beam.elements, gravity);
   std::vector<double> load = weight;
-  SolidVector whole = hyperelastic_weight(beam.mesh, beam.materials, beam.elements, gravity);
+  fit::SolidVector whole =
+      fit::hyperelastic_weight(beam.mesh, beam.materials, beam.elements, gravity);
   for (const bool loaded : {false, true}) {
     for (std::size_t i = 0; loaded && i < beam.mesh.points.size(); ++i) {
       const Vec3& p = beam.mesh.points[i];
@@ -348,7 +352,7 @@ TEST(RotationWarp, ASiliconeBeamDroopsAsMeasured) {
       }
       return most;
     };
-    const WarpState warped = beam.shape(load);
+    const statics::WarpState warped = beam.shape(load);
     std::vector<double> u(load.size());
     for (std::size_t k = 0; k < warped.u.size(); ++k)
       u[3 * std::size_t{beam.warp.surface().nodes()[k / 3]} + k % 3] = warped.u[k];
@@ -366,9 +370,9 @@ TEST(RotationWarp, ASiliconeBeamDroopsAsMeasured) {
       edge.push_back(s);
       on_edge.insert(on_edge.end(), {0, 0, load[3 * i + 2] - weight[3 * i + 2]});
     }
-    const WarpColumns columns = beam.columns(edge);
-    const WarpWholeLoad as_whole = beam.warp.whole_load(weight);
-    WarpState by_columns;
+    const statics::WarpColumns columns = beam.columns(edge);
+    const statics::WarpWholeLoad as_whole = beam.warp.whole_load(weight);
+    statics::WarpState by_columns;
     beam.warp.answer({.columns = columns, .forces = on_edge, .whole = &as_whole}, by_columns);
     EXPECT_LE(by_columns.change, 1e-3);
     EXPECT_LE(beam.error(by_columns.u, u), 1.5e-3);
@@ -380,7 +384,7 @@ TEST(RotationWarp, ASiliconeBeamDroopsAsMeasured) {
 /// middles, whose turning is taken as it stands, from rest.
 TEST(RotationStrain, ForcesTakenBackDoTheSameWork) {
   const Beam beam(2, true, {1e5, 0.45, 1e-3});
-  const RotationStrain& surface = beam.warp.surface();
+  const statics::RotationStrain& surface = beam.warp.surface();
   for (const bool deformed : {false, true}) {
     std::mt19937 random(1);
     std::uniform_real_distribution<double> any(-1, 1);
@@ -417,24 +421,24 @@ TEST(RotationStrain, ForcesTakenBackDoTheSameWork) {
 /// Loads inside, nodes that are held along some axes only: small loads do as in the linear body.
 TEST(RotationWarp, SmallLoadsGiveLinearShapes) {
   for (const bool quadratic : {false, true}) {
-    TetMesh mesh = test::distorted_box();
+    tetrahedra::TetMesh mesh = test::distorted_box();
     if (quadratic)
-      make_quadratic(mesh);
-    const std::vector<SolidMaterial> material{{1e5, 0.4, 1e-3}};
-    const auto elements = solid_elements(mesh, material);
+      tetrahedra::make_quadratic(mesh);
+    const std::vector<fem::SolidMaterial> material{{1e5, 0.4, 1e-3}};
+    const auto elements = fem::solid_elements(mesh, material);
     std::vector<std::uint8_t> fixed;
     for (const Vec3& p : mesh.points)
       fixed.insert(fixed.end(), {p.x == 0, p.y == 0, p.z == 0});
-    const StiffnessMatrix matrix = solid_stiffness(mesh, elements, fixed);
-    const Factor factor(matrix, {});
-    const RotationWarp warp(mesh, elements, fixed, [&](std::span<double> over_axes) {
+    const linalg::StiffnessMatrix matrix = fem::solid_stiffness(mesh, elements, fixed);
+    const linalg::Factor factor(matrix, {});
+    const statics::RotationWarp warp(mesh, elements, fixed, [&](std::span<double> over_axes) {
       const std::vector<double> f(over_axes.begin(), over_axes.end());
-      solve_axes(matrix, factor, f, over_axes);
+      linalg::solve_axes(matrix, factor, f, over_axes);
     });
-    const auto load = gravity_load(mesh, material, elements, {3, -2, 1});
+    const auto load = fem::gravity_load(mesh, material, elements, {3, -2, 1});
     std::vector<double> u(load.size());
-    solve_axes(matrix, factor, load, u);
-    const WarpState shape = Beam::shape_of(warp, load);
+    linalg::solve_axes(matrix, factor, load, u);
+    const statics::WarpState shape = Beam::shape_of(warp, load);
     double most = 0, worst = 0;
     for (std::size_t k = 0; k < shape.u.size(); ++k) {
       const double linear = u[3 * std::size_t{warp.surface().nodes()[k / 3]} + k % 3];
@@ -448,12 +452,13 @@ TEST(RotationWarp, SmallLoadsGiveLinearShapes) {
 
 TEST(RotationStrain, LoadsInsideKeepTheirWorkInAffineMotions) {
   for (const bool quadratic : {false, true}) {
-    TetMesh mesh = test::distorted_box();
+    tetrahedra::TetMesh mesh = test::distorted_box();
     if (quadratic)
-      make_quadratic(mesh);
-    const auto elements = solid_elements(mesh, std::vector<SolidMaterial>{{1e5, 0.4, 1e-3}});
+      tetrahedra::make_quadratic(mesh);
+    const auto elements =
+        fem::solid_elements(mesh, std::vector<fem::SolidMaterial>{{1e5, 0.4, 1e-3}});
     const std::vector<std::uint8_t> fixed = Beam::held(mesh);
-    const RotationStrain surface(mesh, elements, fixed);
+    const statics::RotationStrain surface(mesh, elements, fixed);
     EXPECT_LT(surface.nodes().size(), mesh.points.size());
     std::mt19937 random(1);
     std::uniform_real_distribution<double> any(-1, 1);
@@ -480,7 +485,7 @@ TEST(RotationWarp, EveryProcessorGivesTheSameBytes) {
     Context plain;
     plain.cpu = CpuLevel::baseline;
     plain.threads = 1;
-    const RotationWarp other(beam.mesh, beam.elements, beam.fixed, beam.solve(), plain);
+    const statics::RotationWarp other(beam.mesh, beam.elements, beam.fixed, beam.solve(), plain);
     std::vector<double> load = beam.end_load(true);
     for (double& f : load)
       f *= 100;
@@ -490,13 +495,14 @@ TEST(RotationWarp, EveryProcessorGivesTheSameBytes) {
         nodes.push_back(s);
     const std::vector<double> on_nodes{1e5, 2e4, 0, -1e4, 5e4, 3e4, 0, 0, -1e5};
     EXPECT_EQ(beam.shape(load).u, Beam::shape_of(other, load).u);
-    const WarpColumns columns = beam.columns(nodes);
+    const statics::WarpColumns columns = beam.columns(nodes);
     const std::vector<double> targets{2, 1, 0, -1, 0.5, 1, 0, 0, -3};
     const std::vector<std::uint8_t> held{1, 0, 1};
-    for (const WarpLoad& few :
-         {WarpLoad{.columns = columns, .forces = on_nodes},
-          WarpLoad{.columns = columns, .forces = on_nodes, .held = held, .targets = targets}}) {
-      WarpState one, two;
+    for (const statics::WarpLoad& few :
+         {statics::WarpLoad{.columns = columns, .forces = on_nodes},
+          statics::WarpLoad{
+              .columns = columns, .forces = on_nodes, .held = held, .targets = targets}}) {
+      statics::WarpState one, two;
       beam.warp.answer(few, one);
       other.answer(few, two);
       EXPECT_TRUE(std::isfinite(one.u[0]));
@@ -510,14 +516,14 @@ TEST(RotationWarp, EveryProcessorGivesTheSameBytes) {
 TEST(RotationWarp, ColumnsDoNotTellWhenTheyCame) {
   const Beam beam(2, true, {1e5, 0.45, 1e-3});
   const std::vector<std::uint32_t> some{40, 90, 61}, others{90, 75}, back{61, 40, 90};
-  WarpColumns columns = beam.columns(some);
+  statics::WarpColumns columns = beam.columns(some);
   const auto column_of = [&](std::uint32_t node, std::span<double> of_node) {
     beam.warp.column_of(node, of_node);
   };
   EXPECT_EQ(columns.nodes(), (std::vector<std::uint32_t>{40, 61, 90}));
   columns.set(others, column_of);
   columns.set(back, column_of);
-  const WarpColumns fresh = beam.columns(some);
+  const statics::WarpColumns fresh = beam.columns(some);
   const std::size_t size = 9 * 3 * beam.warp.surface().nodes().size();
   EXPECT_TRUE(
       std::ranges::equal(std::span(columns.values(), size), std::span(fresh.values(), size)));
@@ -531,7 +537,7 @@ TEST(RotationStrain, MiddlesTurnWithTheirTriangles) {
   std::mt19937 random(1);
   std::uniform_real_distribution<double> any(-1, 1);
   // Triangles 0 to 3, nodes 0 and 1 the ends of the edges, 2 to 5 their middles.
-  MiddleGroup group{};
+  statics::MiddleGroup group{};
   std::array<double, 12> w{};
   std::array<double, 18> local{}, u{};
   for (std::uint32_t k = 0; k < 4; ++k) {
@@ -549,7 +555,7 @@ TEST(RotationStrain, MiddlesTurnWithTheirTriangles) {
   for (std::size_t k = 0; k < 6; ++k)
     u[k] = any(random);
   for (const CpuLevel level : {CpuLevel::baseline, best_cpu_level()}) {
-    warp_kernel(level).turn_middles(&group, 1, w.data(), local.data(), u.data());
+    statics::warp_kernel(level).turn_middles(&group, 1, w.data(), local.data(), u.data());
     const auto vector = [](const auto& values, std::size_t n) {
       return Eigen::Vector3d(values[3 * n], values[3 * n + 1], values[3 * n + 2]);
     };
@@ -569,7 +575,7 @@ TEST(RotationStrain, MiddlesTurnWithTheirTriangles) {
 /// The rotation in a surface that turns by its displacements' curl.
 TEST(RotationStrain, RotationsAreThoseOfTheCurl) {
   const Beam beam(2, true, {1e5, 0.45, 1e-3});
-  const RotationStrain& surface = beam.warp.surface();
+  const statics::RotationStrain& surface = beam.warp.surface();
   const Eigen::Vector3d w(0.4, -0.9, 0.7);
   std::vector<double> u;
   for (const std::uint32_t i : surface.nodes()) {
@@ -599,7 +605,7 @@ TEST(RotationWarp, ColumnsAreSummedAsByPlainLoops) {
         x = static_cast<double>(any(random));
       for (double& x : by)
         x = static_cast<double>(any(random));
-      const WarpKernel& kernel = warp_kernel(best_cpu_level());
+      const statics::WarpKernel& kernel = statics::warp_kernel(best_cpu_level());
       kernel.combine(columns.data(), rows, rows, factor.data(), count, sum.data());
       kernel.project(columns.data(), rows, rows, by.data(), count, product.data());
       for (std::size_t k = 0; k < rows; ++k)
@@ -620,9 +626,9 @@ TEST(RotationWarp, FixedNodesGiveWayToNothing) {
   while (!Beam::at_end(beam.mesh.points[beam.warp.surface().nodes()[nodes[1]]]))
     ++nodes[1];
   ASSERT_EQ(beam.mesh.points[beam.warp.surface().nodes()[0]].x, 0);
-  const WarpColumns columns = beam.columns(nodes);
+  const statics::WarpColumns columns = beam.columns(nodes);
   const std::vector<double> forces{1e5, 1e5, 1e5, 2e4, 0, -3e4}, one{0, 0, 0, 2e4, 0, -3e4};
-  WarpState both, free_one;
+  statics::WarpState both, free_one;
   beam.warp.answer({.columns = columns, .forces = forces}, both);
   beam.warp.answer({.columns = columns, .forces = one}, free_one);
   EXPECT_GT(std::abs(both.u[3 * nodes[1] + 2]), 0.1);
@@ -630,17 +636,18 @@ TEST(RotationWarp, FixedNodesGiveWayToNothing) {
 }
 
 TEST(RotationStrain, ASurfaceThatNothingHoldsIsRefused) {
-  const TetMesh mesh = test::box_tetrahedra(2, 2, 2);
-  const auto elements = solid_elements(mesh, std::vector<SolidMaterial>{{1e5, 0.4, 1e-3}});
+  const tetrahedra::TetMesh mesh = test::box_tetrahedra(2, 2, 2);
+  const auto elements =
+      fem::solid_elements(mesh, std::vector<fem::SolidMaterial>{{1e5, 0.4, 1e-3}});
   std::vector<std::uint8_t> fixed(3 * mesh.points.size());
   for (std::size_t axis = 0; axis < 3; ++axis)
     fixed[3 * 13 + axis] = 1; // the node in its middle
-  EXPECT_THROW(RotationStrain(mesh, elements, fixed), Error);
+  EXPECT_THROW(statics::RotationStrain(mesh, elements, fixed), Error);
   fixed[0] = fixed[1] = 1;
-  EXPECT_THROW(RotationStrain(mesh, elements, fixed), Error);
+  EXPECT_THROW(statics::RotationStrain(mesh, elements, fixed), Error);
   fixed[2] = 1;
-  EXPECT_NO_THROW(RotationStrain(mesh, elements, fixed));
+  EXPECT_NO_THROW(statics::RotationStrain(mesh, elements, fixed));
 }
 
 } // namespace
-} // namespace gewebe
+} // namespace gewebe::test

@@ -12,24 +12,24 @@
 #include <string>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::test {
 namespace {
 
 using test::organ;
 
 std::string complaint(std::string_view line) {
-  const std::string said = test::complaint([&] { return parse_scene_line(line); });
+  const std::string said = test::complaint([&] { return formats::parse_scene_line(line); });
   EXPECT_EQ(said.find('\n'), std::string::npos);
   return said;
 }
 
 template <class T>
 T parsed(std::string_view line) {
-  return std::get<T>(parse_scene_line(line).value().what);
+  return std::get<T>(formats::parse_scene_line(line).value().what);
 }
 
-ChangeCommand said(std::string_view line) {
-  return parsed<ChangeCommand>(line);
+formats::ChangeCommand said(std::string_view line) {
+  return parsed<formats::ChangeCommand>(line);
 }
 
 template <class Kind>
@@ -38,116 +38,122 @@ Kind change(std::string_view line) {
 }
 
 TEST(SceneLine, WordsQuotesAndComments) {
-  EXPECT_FALSE(parse_scene_line(""));
-  EXPECT_FALSE(parse_scene_line(" \t\r"));
-  EXPECT_FALSE(parse_scene_line("# step"));
-  EXPECT_TRUE(parse_scene_line("step#comment"));
-  const auto object = parsed<ObjectCommand>(R"(  object a "my organ.ela" store="#1 s".h5  # c "x)");
+  EXPECT_FALSE(formats::parse_scene_line(""));
+  EXPECT_FALSE(formats::parse_scene_line(" \t\r"));
+  EXPECT_FALSE(formats::parse_scene_line("# step"));
+  EXPECT_TRUE(formats::parse_scene_line("step#comment"));
+  const auto object =
+      parsed<formats::ObjectCommand>(R"(  object a "my organ.ela" store="#1 s".h5  # c "x)");
   EXPECT_EQ(object.name, "a");
   EXPECT_EQ(object.model, "my organ.ela");
   EXPECT_EQ(object.store, "#1 s.h5");
-  EXPECT_EQ(object.method, Method::ffe);
-  EXPECT_EQ(parsed<ObjectCommand>("object a b").method, Method::ela);
-  EXPECT_EQ(parsed<ObjectCommand>("object a b method=ffe").method, Method::ffe);
-  EXPECT_EQ(parsed<ObjectCommand>("object a b method=ffe store=s").store, "s");
+  EXPECT_EQ(object.method, scene::Method::ffe);
+  EXPECT_EQ(parsed<formats::ObjectCommand>("object a b").method, scene::Method::ela);
+  EXPECT_EQ(parsed<formats::ObjectCommand>("object a b method=ffe").method, scene::Method::ffe);
+  EXPECT_EQ(parsed<formats::ObjectCommand>("object a b method=ffe store=s").store, "s");
 }
 
 TEST(SceneLine, CommandsWithTheirNumbers) {
-  const ChangeCommand force = said("force liver \"z<3 and not 7\" 1 -2.5e3 +0.25 total");
+  const formats::ChangeCommand force = said("force liver \"z<3 and not 7\" 1 -2.5e3 +0.25 total");
   EXPECT_EQ(force.object, "liver");
   EXPECT_EQ(force.nodes.value().text, "z<3 and not 7");
-  EXPECT_EQ(std::get<SetForce>(force.change).force, (Vec3{1, -2500, 0.25}));
+  EXPECT_EQ(std::get<scene::SetForce>(force.change).force, (Vec3{1, -2500, 0.25}));
   EXPECT_TRUE(force.total);
   EXPECT_FALSE(said("force a 1 1 2 3").total);
-  EXPECT_EQ(change<SetDisplacement>("displace a 1-3,5 0 0 1").displacement, (Vec3{0, 0, 1}));
+  EXPECT_EQ(change<scene::SetDisplacement>("displace a 1-3,5 0 0 1").displacement, (Vec3{0, 0, 1}));
   EXPECT_EQ(said("release a all").nodes.value().text, "all");
-  EXPECT_EQ(change<SetGravity>("gravity 0 0 -9810").gravity, (Vec3{0, 0, -9810}));
-  EXPECT_EQ(change<SetTimestep>("timestep 1e-4").dt, 1e-4);
-  EXPECT_TRUE(change<Emit>("emit forces").forces);
-  EXPECT_EQ(change<SetTwoStep>("two-step a 2.5e5").options.threshold, 2.5e5);
-  EXPECT_FALSE(change<SetTwoStep>("two-step a 2.5e5").options.series);
-  EXPECT_TRUE(change<SetTwoStep>("two-step a 2.5e5 series").options.series);
-  EXPECT_EQ(parse_scene_line("at 1 two-step a 3 series").value().at, 1);
-  EXPECT_FALSE(change<Emit>("emit shapes").forces);
-  EXPECT_EQ(parsed<EmitStressCommand>("emit stress a").object, "a");
-  EXPECT_FALSE(parsed<EmitStressCommand>("emit stress a").nodes);
-  EXPECT_EQ(parsed<EmitStressCommand>("emit stress a z<3").nodes.has_value(), true);
-  EXPECT_THROW((void)parse_scene_line("emit stress"), Error);
-  EXPECT_THROW((void)parse_scene_line("emit stress a all more"), Error);
-  EXPECT_THROW((void)parse_scene_line("at 1 emit stress a"), Error);
-  EXPECT_FALSE(parsed<StepCommand>("step").dt);
-  EXPECT_EQ(parsed<StepCommand>("step 0").dt, 0);
-  EXPECT_EQ(parsed<RunCommand>("run 2 every 0.5").until, 2);
-  EXPECT_EQ(parsed<RunCommand>("run 2 every 0.5").every, 0.5);
-  const auto later = parse_scene_line("at 0.5 release a 3");
+  EXPECT_EQ(change<scene::SetGravity>("gravity 0 0 -9810").gravity, (Vec3{0, 0, -9810}));
+  EXPECT_EQ(change<scene::SetTimestep>("timestep 1e-4").dt, 1e-4);
+  EXPECT_TRUE(change<scene::Emit>("emit forces").forces);
+  EXPECT_EQ(change<scene::SetTwoStep>("two-step a 2.5e5").options.threshold, 2.5e5);
+  EXPECT_FALSE(change<scene::SetTwoStep>("two-step a 2.5e5").options.series);
+  EXPECT_TRUE(change<scene::SetTwoStep>("two-step a 2.5e5 series").options.series);
+  EXPECT_EQ(formats::parse_scene_line("at 1 two-step a 3 series").value().at, 1);
+  EXPECT_FALSE(change<scene::Emit>("emit shapes").forces);
+  EXPECT_EQ(parsed<formats::EmitStressCommand>("emit stress a").object, "a");
+  EXPECT_FALSE(parsed<formats::EmitStressCommand>("emit stress a").nodes);
+  EXPECT_EQ(parsed<formats::EmitStressCommand>("emit stress a z<3").nodes.has_value(), true);
+  EXPECT_THROW((void)formats::parse_scene_line("emit stress"), Error);
+  EXPECT_THROW((void)formats::parse_scene_line("emit stress a all more"), Error);
+  EXPECT_THROW((void)formats::parse_scene_line("at 1 emit stress a"), Error);
+  EXPECT_FALSE(parsed<formats::StepCommand>("step").dt);
+  EXPECT_EQ(parsed<formats::StepCommand>("step 0").dt, 0);
+  EXPECT_EQ(parsed<formats::RunCommand>("run 2 every 0.5").until, 2);
+  EXPECT_EQ(parsed<formats::RunCommand>("run 2 every 0.5").every, 0.5);
+  const auto later = formats::parse_scene_line("at 0.5 release a 3");
   EXPECT_EQ(later.value().at, 0.5);
-  EXPECT_NO_THROW(change<Release>("at 0.5 release a 3"));
-  EXPECT_FALSE(parse_scene_line("step").value().at);
-  EXPECT_TRUE(parse_scene_line("at every 0.5 release a 3").value().every);
+  EXPECT_NO_THROW(change<scene::Release>("at 0.5 release a 3"));
+  EXPECT_FALSE(formats::parse_scene_line("step").value().at);
+  EXPECT_TRUE(formats::parse_scene_line("at every 0.5 release a 3").value().every);
   EXPECT_FALSE(later.value().every);
-  EXPECT_EQ(change<SetForce>("force a 1 1 2 3 total period 0.8").period, 0.8);
-  EXPECT_EQ(change<SetPressure>("pressure a all -20").pressure.pressure, -20);
-  EXPECT_EQ(change<SetPressure>("pressure a all -20 period 2").pressure.period, 2);
-  EXPECT_EQ(change<SetMass>("mass a 3,4 102").mass, 102);
+  EXPECT_EQ(change<scene::SetForce>("force a 1 1 2 3 total period 0.8").period, 0.8);
+  EXPECT_EQ(change<scene::SetPressure>("pressure a all -20").pressure.pressure, -20);
+  EXPECT_EQ(change<scene::SetPressure>("pressure a all -20 period 2").pressure.period, 2);
+  EXPECT_EQ(change<scene::SetMass>("mass a 3,4 102").mass, 102);
   EXPECT_TRUE(said("mass a 3,4 102").total);
   EXPECT_FALSE(said("at 1 mass a 3,4 102 each").total);
-  EXPECT_EQ(change<SetDisplacement>("displace a 1 0 0 1 over 0.25").duration, 0.25);
-  EXPECT_EQ(change<Attach>("attach a 1 b z<3 500").stiffness, 500);
+  EXPECT_EQ(change<scene::SetDisplacement>("displace a 1 0 0 1 over 0.25").duration, 0.25);
+  EXPECT_EQ(change<scene::Attach>("attach a 1 b z<3 500").stiffness, 500);
   EXPECT_EQ(said("attach a 1 b z<3 500").other, "b");
   EXPECT_EQ(said("attach a 1 b z<3 500").others.value().text, "z<3");
   EXPECT_EQ(said("grasp a z<3 tongs").instrument, "tongs");
-  EXPECT_EQ(parsed<ObjectCommand>("object a a.ela integration=implicit").integration,
-            Integration::implicit);
-  EXPECT_EQ(parsed<ObjectCommand>("object a a.ela integration=auto").integration,
-            Integration::automatic);
-  EXPECT_TRUE(parsed<ObjectCommand>("object a a.ela method=ffe rotation=warp").warp);
-  EXPECT_TRUE(parsed<ObjectCommand>("object a a.ela rotation=warp store=a.h5").warp);
-  EXPECT_FALSE(parsed<ObjectCommand>("object a a.ela store=a.h5").warp);
+  EXPECT_EQ(parsed<formats::ObjectCommand>("object a a.ela integration=implicit").integration,
+            scene::Integration::implicit);
+  EXPECT_EQ(parsed<formats::ObjectCommand>("object a a.ela integration=auto").integration,
+            scene::Integration::automatic);
+  EXPECT_TRUE(parsed<formats::ObjectCommand>("object a a.ela method=ffe rotation=warp").warp);
+  EXPECT_TRUE(parsed<formats::ObjectCommand>("object a a.ela rotation=warp store=a.h5").warp);
+  EXPECT_FALSE(parsed<formats::ObjectCommand>("object a a.ela store=a.h5").warp);
   // What an object has no use for now it may have by another method.
-  EXPECT_EQ(parsed<ObjectCommand>("object a a.ela store=x method=ela").method, Method::ela);
-  EXPECT_EQ(change<SetMethod>("method a ffe").method, Method::ffe);
+  EXPECT_EQ(parsed<formats::ObjectCommand>("object a a.ela store=x method=ela").method,
+            scene::Method::ela);
+  EXPECT_EQ(change<scene::SetMethod>("method a ffe").method, scene::Method::ffe);
   EXPECT_EQ(said("method a ela").object, "a");
   EXPECT_FALSE(said("cut a springs z<3").others);
   EXPECT_TRUE(said("cut a springs z<3 z>3").others);
   EXPECT_FALSE(said("cut a plane 1 2 3 0 0 2").nodes);
   EXPECT_EQ(
-      std::get<PlaneToCut>(change<CutObject>("cut a plane 1 2 3 0 0 2 z<3").what).plane.normal.z,
+      std::get<scene::PlaneToCut>(change<scene::CutObject>("cut a plane 1 2 3 0 0 2 z<3").what)
+          .plane.normal.z,
       2);
-  EXPECT_EQ(change<SetTear>("tear a 0.5").strain, 0.5);
-  EXPECT_EQ(parse_scene_line("at 1 restore a").value().at, 1);
-  EXPECT_TRUE(change<SetInstrument>("instrument k blade 1 2 3 1 2 8").shape.blade);
-  EXPECT_EQ(change<SetInstrument>("instrument k blade 1 2 3 1 2 8").shape.axis, (Vec3{0, 0, 5}));
-  const auto capsule = change<SetInstrument>("instrument k capsule 4 1 2 3 1 7 3 friction 0.3");
+  EXPECT_EQ(change<scene::SetTear>("tear a 0.5").strain, 0.5);
+  EXPECT_EQ(formats::parse_scene_line("at 1 restore a").value().at, 1);
+  EXPECT_TRUE(change<scene::SetInstrument>("instrument k blade 1 2 3 1 2 8").shape.blade);
+  EXPECT_EQ(change<scene::SetInstrument>("instrument k blade 1 2 3 1 2 8").shape.axis,
+            (Vec3{0, 0, 5}));
+  const auto capsule =
+      change<scene::SetInstrument>("instrument k capsule 4 1 2 3 1 7 3 friction 0.3");
   EXPECT_FALSE(capsule.shape.blade);
   EXPECT_EQ(capsule.shape.radius, 4);
   EXPECT_EQ(capsule.pose.place, (Vec3{1, 2, 3}));
   EXPECT_EQ(capsule.shape.axis, (Vec3{0, 5, 0})); // from one end to the other
   EXPECT_EQ(capsule.shape.friction, 0.3);
-  EXPECT_EQ(change<SetInstrument>("instrument k sphere 4 1 2 3").shape.axis, Vec3{});
-  const auto mesh = change<SetInstrument>(
+  EXPECT_EQ(change<scene::SetInstrument>("instrument k sphere 4 1 2 3").shape.axis, Vec3{});
+  const auto mesh = change<scene::SetInstrument>(
       "instrument k mesh jaw.ply radius=0.5 1 2 3 turn 0 0 2 90 friction 0.3");
   EXPECT_EQ(mesh.shape.radius, 0.5);
   EXPECT_EQ(mesh.shape.friction, 0.3);
   EXPECT_EQ(mesh.pose.place, (Vec3{1, 2, 3}));
-  EXPECT_EQ(mesh.pose.turn, turn_about({0, 0, 1}, 90));
+  EXPECT_EQ(mesh.pose.turn, contact::turn_about({0, 0, 1}, 90));
   EXPECT_EQ(said("at 2 instrument k mesh \"a jaw.ply\" 1 2 3").mesh, "a jaw.ply");
-  EXPECT_EQ(change<SetInstrument>("instrument k mesh jaw.ply 1 2 3").shape.radius, 0);
-  const auto move = change<MoveInstrument>("move k 1 2 3 quaternion 2 0 0 0 over 0.5");
+  EXPECT_EQ(change<scene::SetInstrument>("instrument k mesh jaw.ply 1 2 3").shape.radius, 0);
+  const auto move = change<scene::MoveInstrument>("move k 1 2 3 quaternion 2 0 0 0 over 0.5");
   EXPECT_EQ(move.place, (Vec3{1, 2, 3}));
-  EXPECT_EQ(move.turn, (Quaternion{1, 0, 0, 0}));
+  EXPECT_EQ(move.turn, (contact::Quaternion{1, 0, 0, 0}));
   EXPECT_EQ(move.duration, 0.5);
-  EXPECT_EQ(change<MoveInstrument>("move k 1 2 3 quaternion 0 0 3 4").turn,
-            (Quaternion{0, 0, 0.6, 0.8}));
-  EXPECT_FALSE(change<MoveInstrument>("move k 1 2 3").turn);
-  EXPECT_EQ(change<MoveInstrument>("move k 1 2 3 turn 0 0 2 90").turn, turn_about({0, 0, 1}, 90));
+  EXPECT_EQ(change<scene::MoveInstrument>("move k 1 2 3 quaternion 0 0 3 4").turn,
+            (contact::Quaternion{0, 0, 0.6, 0.8}));
+  EXPECT_FALSE(change<scene::MoveInstrument>("move k 1 2 3").turn);
+  EXPECT_EQ(change<scene::MoveInstrument>("move k 1 2 3 turn 0 0 2 90").turn,
+            contact::turn_about({0, 0, 1}, 90));
 }
 
 TEST(SceneLine, WordsMakeALineThatHasTheseWords) {
   for (const std::vector<std::string>& words :
        {std::vector<std::string>{"force", "a", "z>3 and not 7", "1"},
         {"object", "", "a#b", "c\td"}})
-    EXPECT_EQ(scene_words(scene_line(words)), words);
-  EXPECT_EQ(scene_words("a\"b c\"d  # e"), (std::vector<std::string>{"ab cd"}));
+    EXPECT_EQ(formats::scene_words(formats::scene_line(words)), words);
+  EXPECT_EQ(formats::scene_words("a\"b c\"d  # e"), (std::vector<std::string>{"ab cd"}));
 }
 
 TEST(SceneLine, EveryBadLineSaysWhatWasExpected) {
@@ -261,13 +267,13 @@ struct FrameLog {
   std::vector<std::size_t> sizes;
 };
 
-class FrameLogger final : public ResultWriter {
+class FrameLogger final : public formats::ResultWriter {
 public:
   explicit FrameLogger(FrameLog& log) : log_(log) {}
-  void add_object(const std::string& name, const Model& /*model*/) override {
+  void add_object(const std::string& name, const model::Model& /*model*/) override {
     log_.names.push_back(name);
   }
-  void add_frame(double time, std::span<const FrameObject> objects) override {
+  void add_frame(double time, std::span<const formats::FrameObject> objects) override {
     log_.times.push_back(time);
     log_.sizes.push_back(objects.size());
   }
@@ -282,13 +288,13 @@ struct Played {
   std::string replies, error;
   std::vector<std::string> warnings;
   FrameLog frames;
-  SceneCounts counts;
+  cli::SceneCounts counts;
   double time = 0;
 };
 
 Played play(const std::vector<std::string>& lines) {
   Played out;
-  SceneOptions options;
+  cli::SceneOptions options;
   options.files.model = [](const std::string& name) {
     if (name == "two")
       return test::two_masses();
@@ -296,7 +302,8 @@ Played play(const std::vector<std::string>& lines) {
       throw Error(name, "cannot open");
     return organ();
   };
-  options.files.store = [](const std::string& name, const Model&) -> StoredStiffness {
+  options.files.store = [](const std::string& name,
+                           const model::Model&) -> compliance::StoredStiffness {
     throw Error(name, "is of another model");
   };
   options.files.node_list = [](const std::string& name) {
@@ -309,7 +316,7 @@ Played play(const std::vector<std::string>& lines) {
   options.measure = true;
   Context context;
   context.threads = 1;
-  SceneRun run("s", context, options);
+  cli::SceneRun run("s", context, options);
   try {
     for (const std::string& line : lines)
       run.line(line);
@@ -330,7 +337,7 @@ TEST(SceneRun, RepliesAreThoseOfTheManPage) {
   EXPECT_EQ(p.replies.substr(16, 36), "step 2 0.75\nforces a 0\nforces b 1\n4 ");
   const std::size_t shapes = p.replies.find("shapes a 2\n-1 0 0\n1 0 0\nshapes b ");
   ASSERT_NE(shapes, std::string::npos);
-  const Model model = organ();
+  const model::Model model = organ();
   EXPECT_NE(p.replies.find("shapes b " + std::to_string(model.nodes.size()) + "\n"),
             std::string::npos);
   EXPECT_NE(p.replies.find("\n100.5 -50 50.25\n"), std::string::npos); // node 4 is the top
@@ -481,28 +488,28 @@ TEST(SceneRun, AnObjectMayComeLater) {
 TEST(SceneRun, LinesComeFromAnInput) {
   const ScratchFile scene(".scene"), model(".ela");
   {
-    std::ofstream(model.path()) << ela_text(organ());
+    std::ofstream(model.path()) << formats::ela_text(organ());
     const std::string base = model.path().substr(model.path().rfind('/') + 1);
     std::ofstream(scene.path()) << "object a " << base << "\r\nstep 1\n\nstep 2"; // no end
   }
   std::string replies;
-  SceneOptions options;
-  options.files = scene_files(scene.path(), Context{});
+  cli::SceneOptions options;
+  options.files = cli::scene_files(scene.path(), Context{});
   options.reply = [&](std::string_view text) { replies += text; };
-  Input input(scene.path(), false);
-  SceneRun run(input.name(), Context{}, options);
-  run_scene(input, run);
+  formats::Input input(scene.path(), false);
+  cli::SceneRun run(input.name(), Context{}, options);
+  cli::run_scene(input, run);
   EXPECT_EQ(replies, "step 1 1\ndone\nstep 2 3\ndone\n");
   // From elsewhere the model is not found, for its name counts from the scene's folder.
-  options.files = scene_files("/nowhere/x", Context{});
-  Input again(scene.path(), false);
-  SceneRun lost(again.name(), Context{}, options);
-  EXPECT_THROW(run_scene(again, lost), Error);
+  options.files = cli::scene_files("/nowhere/x", Context{});
+  formats::Input again(scene.path(), false);
+  cli::SceneRun lost(again.name(), Context{}, options);
+  EXPECT_THROW(cli::run_scene(again, lost), Error);
   std::ofstream(scene.path()) << std::string(17 << 20, 'x');
-  Input endless(scene.path(), false);
-  SceneRun refused(endless.name(), Context{}, options);
-  EXPECT_THROW(run_scene(endless, refused), Error);
+  formats::Input endless(scene.path(), false);
+  cli::SceneRun refused(endless.name(), Context{}, options);
+  EXPECT_THROW(cli::run_scene(endless, refused), Error);
 }
 
 } // namespace
-} // namespace gewebe
+} // namespace gewebe::test

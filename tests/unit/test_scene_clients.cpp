@@ -22,7 +22,7 @@
 #include <unistd.h>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::test {
 namespace {
 
 using Clock = std::chrono::steady_clock;
@@ -82,8 +82,8 @@ public:
   static constexpr std::size_t much = 60 * step;
 
 private:
-  SceneClientsOptions options(double patience) {
-    SceneClientsOptions result;
+  cli::SceneClientsOptions options(double patience) {
+    cli::SceneClientsOptions result;
     result.most_unread = 0;
     result.patience = patience;
     result.warn = [this](const std::string& text) {
@@ -94,14 +94,14 @@ private:
   }
 
   void serve() {
-    SceneOptions scene;
+    cli::SceneOptions scene;
     scene.files.model = [](const std::string&) { return test::two_masses(); };
     scene.serve = true;
     scene.acknowledge = true;
     scene.reply = [this](std::string_view text) {
       clients_.reply(text.starts_with("ok 2") ? std::string(much, '.') : std::string(text));
     };
-    SceneRun run("scene", test::one_thread(), scene);
+    cli::SceneRun run("scene", test::one_thread(), scene);
     clients_.serve(run);
   }
 
@@ -122,7 +122,7 @@ private:
   std::string path_ = file_.path() + ".socket";
   std::mutex mutex_;
   std::vector<std::string> warnings_;
-  SceneClients clients_;
+  cli::SceneClients clients_;
   std::thread server_;
   int client_ = -1;
   std::array<char, 1U << 16U> buffer_{};
@@ -175,4 +175,4 @@ TEST(SceneClients, AClientThatReadsNothingIsDropped) {
 }
 
 } // namespace
-} // namespace gewebe
+} // namespace gewebe::test

@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::test {
 namespace {
 
 using Lines = std::vector<std::string>;
@@ -103,4 +103,4 @@ TEST(SceneIntegration, AnAttachmentThatWaitsHasBothMoveAlikeFromThenOn) {
 }
 
 } // namespace
-} // namespace gewebe
+} // namespace gewebe::test

@@ -9,13 +9,13 @@
 #include <optional>
 #include <string>
 
-namespace gewebe {
+namespace gewebe::test {
 namespace {
 
 double end_of(const std::string& scene) {
   const ScratchFile file(".scene");
   std::ofstream(file.path(), std::ios::binary) << scene;
-  const std::optional<double> end = find_scene_end(file.path());
+  const std::optional<double> end = cli::find_scene_end(file.path());
   EXPECT_TRUE(end.has_value());
   return end.value_or(-1);
 }
@@ -41,10 +41,10 @@ TEST(SceneEnd, PassesOverWrongAndLongLines) {
 }
 
 TEST(SceneEnd, IsUnknownWithoutARegularFile) {
-  EXPECT_FALSE(find_scene_end("/dev/null").has_value());
-  EXPECT_FALSE(find_scene_end("/nowhere/at/all.scene").has_value());
-  EXPECT_FALSE(find_scene_end("/").has_value());
+  EXPECT_FALSE(cli::find_scene_end("/dev/null").has_value());
+  EXPECT_FALSE(cli::find_scene_end("/nowhere/at/all.scene").has_value());
+  EXPECT_FALSE(cli::find_scene_end("/").has_value());
 }
 
 } // namespace
-} // namespace gewebe
+} // namespace gewebe::test

@@ -19,7 +19,7 @@
 #include <string>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::test {
 namespace {
 
 struct Asked {
@@ -37,13 +37,13 @@ Asked ask(const std::vector<std::string>& lines, bool acknowledge = false, bool 
   Asked out;
   const ScratchFile record(".scene"), events(".csv");
   {
-    SceneRecord log(record.path(), Output::Options{}, "-");
-    EventLog table(events.path(), Output::Options{.binary = false});
-    SceneOptions options;
+    cli::SceneRecord log(record.path(), formats::Output::Options{}, "-");
+    cli::EventLog table(events.path(), formats::Output::Options{.binary = false});
+    cli::SceneOptions options;
     options.files.model = [&](const std::string& name) {
       return test::fuzzed_models().at(name.substr(name.find_last_of('/') + 1));
     };
-    options.files.store = [](const std::string& name, const Model&) {
+    options.files.store = [](const std::string& name, const model::Model&) {
       return test::fuzzed_store(name.substr(name.find_last_of('/') + 1), 1);
     };
     options.files.node_list = [](const std::string&) { return std::string("4 6-7 # nodes\n"); };
@@ -53,7 +53,7 @@ Asked ask(const std::vector<std::string>& lines, bool acknowledge = false, bool 
     options.binary = binary;
     options.record = &log;
     options.events = &table;
-    SceneRun run("s", Context{}, options);
+    cli::SceneRun run("s", Context{}, options);
     for (const std::string& line : lines)
       run.line(line);
     run.finish();
@@ -96,17 +96,17 @@ std::vector<std::string> with_questions(const std::vector<std::string>& lines) {
 
 TEST(SceneQuestions, AreRead) {
   const auto query = [](const char* line) {
-    return std::get<QueryCommand>(parse_scene_line(line).value().what);
+    return std::get<formats::QueryCommand>(formats::parse_scene_line(line).value().what);
   };
-  EXPECT_EQ(query("nodes a").positions, QueryCommand::Positions::none);
-  EXPECT_EQ(query("nodes a rest").positions, QueryCommand::Positions::rest);
-  EXPECT_EQ(query("nodes a positions").positions, QueryCommand::Positions::now);
+  EXPECT_EQ(query("nodes a").positions, formats::QueryCommand::Positions::none);
+  EXPECT_EQ(query("nodes a rest").positions, formats::QueryCommand::Positions::rest);
+  EXPECT_EQ(query("nodes a positions").positions, formats::QueryCommand::Positions::now);
   EXPECT_EQ(query("select a \"z<3 and not 4\"").nodes->text, "z<3 and not 4");
-  EXPECT_EQ(query("objects").kind, QueryCommand::Kind::objects);
-  EXPECT_EQ(query("instruments # all").kind, QueryCommand::Kind::instruments);
+  EXPECT_EQ(query("objects").kind, formats::QueryCommand::Kind::objects);
+  EXPECT_EQ(query("instruments # all").kind, formats::QueryCommand::Kind::instruments);
   for (const char* line : {"nodes", "nodes a now", "nodes a rest positions", "select a",
                            "select a z<", "objects a", "instruments p", "at 1 objects"})
-    EXPECT_THROW((void)parse_scene_line(line), Error) << line;
+    EXPECT_THROW((void)formats::parse_scene_line(line), Error) << line;
 }
 
 TEST(SceneQuestions, TellWhatThereIs) {
@@ -120,13 +120,13 @@ TEST(SceneQuestions, TellWhatThereIs) {
                     triangles = test::fuzzed_models().at("gel").triangles.size(),
                     tetrahedra = test::fuzzed_models().at("gel").tetrahedra.size();
   EXPECT_EQ(out.replies.at(0), "objects 2\na ela - - - asleep\nb ffe - - - -\n");
-  const std::vector<Node>& two = test::fuzzed_models().at("two").nodes;
+  const std::vector<model::Node>& two = test::fuzzed_models().at("two").nodes;
   std::string rest = "nodes a 2\n", moved = rest;
   for (std::size_t k = 0; k < 2; ++k) {
     const Vec3& p = two[k].position;
-    const std::string x = number_text(p.x) + " ", z = " " + number_text(p.z) + "\n";
-    rest += x + number_text(p.y) + z;
-    moved += x + number_text(p.y + (k == 1 ? 0.25 : 0)) + z;
+    const std::string x = text::number_text(p.x) + " ", z = " " + text::number_text(p.z) + "\n";
+    rest += x + text::number_text(p.y) + z;
+    moved += x + text::number_text(p.y + (k == 1 ? 0.25 : 0)) + z;
   }
   EXPECT_EQ(out.replies.at(1), rest);
   EXPECT_EQ(out.replies.at(2), "nodes b " + std::to_string(nodes) + "\n");
@@ -171,11 +171,11 @@ TEST(SceneQuestions, EachLineIsAcknowledgedOnceAndLast) {
     std::uint64_t count = 0, number = 0;
     std::memcpy(&kind, &reply.at(4), 4);
     std::memcpy(&count, &reply.at(20), 8);
-    if (kind == static_cast<std::uint32_t>(FrameKind::ok)) {
+    if (kind == static_cast<std::uint32_t>(formats::FrameKind::ok)) {
       ASSERT_EQ(reply.size(), 36U);
       std::memcpy(&number, &reply.at(28), 8);
       acknowledged_lines.push_back(number);
-    } else if (kind == static_cast<std::uint32_t>(FrameKind::told)) {
+    } else if (kind == static_cast<std::uint32_t>(formats::FrameKind::told)) {
       EXPECT_EQ(reply.size(), 28 + 4 * count);
       told += reply.substr(28).c_str();
     }
@@ -190,7 +190,7 @@ TEST(SceneQuestions, ChangeNothing) {
   std::vector<std::string> lines{"object a ball store=ball", "object b gel store=gel",
                                  "object c shell", "emit forces"};
   std::mt19937 random(3);
-  const auto number = [&] { return number_text(static_cast<double>(random() % 1000) / 3e3); };
+  const auto number = [&] { return text::number_text(static_cast<double>(random() % 1000) / 3e3); };
   for (int k = 0; k < 20; ++k) {
     const std::string object(1, "ab"[random() % 2]),
         node = object == "a" ? std::to_string(6 + random() % 6) : "x>23";
@@ -237,4 +237,4 @@ TEST(SceneQuestions, ChangeNothingInAnyScene) {
 }
 
 } // namespace
-} // namespace gewebe
+} // namespace gewebe::test

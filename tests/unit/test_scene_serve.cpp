@@ -26,7 +26,7 @@
 #include <string>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::test {
 namespace {
 
 using test::organ;
@@ -55,7 +55,7 @@ struct Served {
 Served serve(const std::vector<std::string>& lines, const std::string& record = "",
              const std::string& events = "", bool serving = true) {
   Served out;
-  SceneOptions options;
+  cli::SceneOptions options;
   const auto base = [](const std::string& name) { return name.substr(name.find_last_of('/') + 1); };
   options.files.model = [&](const std::string& name) {
     if (base(name) == "two")
@@ -64,22 +64,23 @@ Served serve(const std::vector<std::string>& lines, const std::string& record = 
       throw Error(name, "cannot open");
     return organ(1);
   };
-  options.files.store = [](const std::string& name, const Model&) -> StoredStiffness {
+  options.files.store = [](const std::string& name,
+                           const model::Model&) -> compliance::StoredStiffness {
     throw Error(name, "is damaged");
   };
   options.files.node_list = [](const std::string&) { return std::string("4 6-7 # nodes\n"); };
   options.reply = [&](std::string_view text) { out.replies += text; };
   options.serve = serving;
   options.measure = true;
-  std::optional<SceneRecord> log;
+  std::optional<cli::SceneRecord> log;
   if (!record.empty())
-    options.record = &log.emplace(record, Output::Options{}, "-");
-  std::optional<EventLog> table;
+    options.record = &log.emplace(record, formats::Output::Options{}, "-");
+  std::optional<cli::EventLog> table;
   if (!events.empty())
-    options.events = &table.emplace(events, Output::Options{.binary = false});
+    options.events = &table.emplace(events, formats::Output::Options{.binary = false});
   Context context;
   context.threads = 1;
-  SceneRun run("s", context, options);
+  cli::SceneRun run("s", context, options);
   try {
     for (const std::string& line : lines)
       run.line(line);
@@ -249,18 +250,18 @@ TEST(SceneServe, ResultsHoldWhatWasAnsweredAlone) {
 TEST(SceneServe, ARecordNamesFilesAsAScenesWordsCan) {
   const ScratchFile record(".scene");
   for (const char* folder : {"a\"b/", "a\nb/"}) {
-    EXPECT_THROW(SceneRecord(record.path(), Output::Options{},
-                             std::string("/nowhere/") + folder + "s.scene"),
+    EXPECT_THROW(cli::SceneRecord(record.path(), formats::Output::Options{},
+                                  std::string("/nowhere/") + folder + "s.scene"),
                  Error)
         << folder;
   }
-  SceneRecord named(record.path(), Output::Options{}, "/nowhere/a b#c/s.scene");
+  cli::SceneRecord named(record.path(), formats::Output::Options{}, "/nowhere/a b#c/s.scene");
   const std::string line = "object o \"my m.ela\" store=\"s t.h5\"";
-  named.line(line, *parse_scene_line(line), {});
+  named.line(line, *formats::parse_scene_line(line), {});
   named.commit();
   const std::string kept = lines_of(content(record.path())).at(0);
-  const auto command = parse_scene_line(kept);
-  const auto& object = std::get<ObjectCommand>(command->what);
+  const auto command = formats::parse_scene_line(kept);
+  const auto& object = std::get<formats::ObjectCommand>(command->what);
   EXPECT_TRUE(object.model.ends_with("/nowhere/a b#c/my m.ela")) << kept;
   EXPECT_TRUE(object.store.ends_with("/nowhere/a b#c/s t.h5")) << kept;
 }
@@ -272,18 +273,18 @@ TEST(SceneServe, ALineWithoutEndIsRefusedAtOnce) {
       << std::string((1U << 24U) + 5, '#') << "\nstep 0.1\n";
   for (const bool serving : {false, true}) {
     std::string replies;
-    SceneOptions options;
+    cli::SceneOptions options;
     options.files.model = [](const std::string&) { return test::two_masses(); };
     options.reply = [&](std::string_view text) { replies += text; };
     options.serve = serving;
-    SceneRun run("s", Context{}, options);
-    Input input(file.path(), false);
+    cli::SceneRun run("s", Context{}, options);
+    formats::Input input(file.path(), false);
     if (serving) {
-      run_scene(input, run);
+      cli::run_scene(input, run);
       EXPECT_EQ(run.counts().errors, 1U);
       EXPECT_NE(replies.find("step 1 0.1"), std::string::npos);
     } else {
-      EXPECT_THROW(run_scene(input, run), Error);
+      EXPECT_THROW(cli::run_scene(input, run), Error);
     }
   }
 }
@@ -456,7 +457,7 @@ TEST(SceneServe, EventsSayWhoTouchedWhatWhen) {
 }
 
 TEST(StepLatency, QuantilesAreThoseOfTheSteps) {
-  StepLatency latency(1e-3);
+  cli::StepLatency latency(1e-3);
   EXPECT_EQ(latency.quantile(0.5), 0);
   latency.line_arrived();
   for (std::uint64_t k = 1; k <= 1000; ++k)
@@ -469,7 +470,7 @@ TEST(StepLatency, QuantilesAreThoseOfTheSteps) {
   EXPECT_EQ(latency.quantile(1), latency.largest());
   EXPECT_GE(latency.sum(), latency.largest());
   EXPECT_LE(latency.sum(), 1000 * latency.largest());
-  StepLatency strict(1e15);
+  cli::StepLatency strict(1e15);
   strict.line_arrived();
   strict.answered(1, 0);
   EXPECT_EQ(strict.missed(), 1U);
@@ -479,12 +480,13 @@ TEST(ResultsMesh, ASeriesHasOneFileForEachFrame) {
   const ScratchFile name;
   const std::string folder = name.path() + ".folder";
   std::filesystem::create_directory(folder);
-  const Model model = organ(1);
-  const auto writer = open_mesh_result(Kind::ply, folder + "/run_%03d.ply", Output::Options{});
+  const model::Model model = organ(1);
+  const auto writer = formats::open_mesh_result(formats::Kind::ply, folder + "/run_%03d.ply",
+                                                formats::Output::Options{});
   writer->add_object("o", model);
   std::vector<double> u(3 * model.nodes.size());
   for (int k = 0; k < 3; ++k) {
-    const FrameObject frame{u, {}};
+    const formats::FrameObject frame{u, {}};
     writer->add_frame(k, std::span(&frame, 1));
     u[0] += 1;
   }
@@ -496,7 +498,9 @@ TEST(ResultsMesh, ASeriesHasOneFileForEachFrame) {
   EXPECT_EQ(names, (std::vector<std::string>{"run_000.ply", "run_001.ply", "run_002.ply"}));
   EXPECT_NE(content(folder + "/run_000.ply"), content(folder + "/run_002.ply"));
   for (const char* pattern : {"%s.ply", "%.ply", "%d%d.ply", "%4d.ply", "%00d.ply", "%010d.ply"})
-    EXPECT_THROW(open_mesh_result(Kind::ply, folder + "/" + pattern, {}), UsageError) << pattern;
+    EXPECT_THROW(formats::open_mesh_result(formats::Kind::ply, folder + "/" + pattern, {}),
+                 UsageError)
+        << pattern;
   std::filesystem::remove_all(folder);
 }
 
@@ -506,14 +510,14 @@ TEST(RunReport, VerifyTakesWhatIsWithinItsBoundsAlone) {
   const double nan = std::numeric_limits<double>::quiet_NaN();
   const auto passes = [](double shape, double backward, double tolerance, double limit = 1e-6,
                          double change = 0) {
-    ElastostaticCounts errors;
+    statics::ElastostaticCounts errors;
     errors.shape_error = shape;
     errors.backward_error = backward;
     errors.worst_shape.error = backward;
     errors.worst_shape.limit = limit;
     errors.change = change;
     try {
-      require_verified(errors, tolerance);
+      cli::require_verified(errors, tolerance);
     } catch (const Error&) {
       return false;
     }
@@ -536,4 +540,4 @@ TEST(RunReport, VerifyTakesWhatIsWithinItsBoundsAlone) {
 }
 
 } // namespace
-} // namespace gewebe
+} // namespace gewebe::test

@@ -18,7 +18,7 @@
 #include <cstdint>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::test {
 namespace {
 
 using Numbers = std::vector<double>;
@@ -34,7 +34,7 @@ TEST(Scrambled, BodiesThatStandInsideOutFindBack) {
         Case{0, 14957}, Case{0, 16108}, Case{0, 18208}, Case{0, 19019}, Case{1, 328}, Case{1, 973},
         Case{3, 93}, Case{3, 95}, Case{3, 147}}) {
     const test::Scrambled of = test::scrambled(seed, test::kinds.at(kind));
-    SolidMotion body(of.mesh, std::vector<SolidMaterial>{of.material}, of.options);
+    integrator::SolidMotion body(of.mesh, std::vector<fem::SolidMaterial>{of.material}, of.options);
     body.set_state(of.displacement, Numbers(of.displacement.size()));
     const double first = body.elastic_energy();
     double before = first;
@@ -50,11 +50,11 @@ TEST(Scrambled, BodiesThatStandInsideOutFindBack) {
 
 /// Where corotational elements have minima inside out: without another way back every fifth stays.
 TEST(Scrambled, ScrambledBodiesThatKeepTheirVolumeFindBack) {
-  const TetMesh m = test::box_tetrahedra(3, 3, 2, 5);
+  const tetrahedra::TetMesh m = test::box_tetrahedra(3, 3, 2, 5);
   const std::size_t axes = 3 * m.points.size();
   test::Chance chance{std::mt19937(11)};
   for (int n = 0; n < 20; ++n) {
-    SolidMotion moving(m, std::vector<SolidMaterial>{{2e4, 0.49, 1e-3}}, {});
+    integrator::SolidMotion moving(m, std::vector<fem::SolidMaterial>{{2e4, 0.49, 1e-3}}, {});
     const Numbers u = chance.numbers(axes, 7);
     moving.set_state(u, Numbers(axes));
     const double first = moving.elastic_energy();
@@ -66,7 +66,7 @@ TEST(Scrambled, ScrambledBodiesThatKeepTheirVolumeFindBack) {
       before = after;
     }
     EXPECT_EQ(test::inverted(m, moving.places()), 0) << n;
-    SolidMotion standing(m, std::vector<SolidMaterial>{{2e4, 0.49, 1e-3}}, {});
+    integrator::SolidMotion standing(m, std::vector<fem::SolidMaterial>{{2e4, 0.49, 1e-3}}, {});
     standing.set_state(moving.displacement(), Numbers(axes)); // it is its own again
     EXPECT_NEAR(moving.elastic_energy(), standing.elastic_energy(), 1e-7 * first) << n;
   }
@@ -76,7 +76,7 @@ TEST(Scrambled, ScrambledBodiesThatKeepTheirVolumeFindBack) {
 /// forces as one that never was inside out.
 TEST(Scrambled, ABodyThatFindsBackInOneStepAnswersForces) {
   constexpr double young = 2e4, edge = 5, volume = 2 * edge * edge * edge;
-  const TetMesh m = test::box_tetrahedra(2, 1, 1, edge);
+  const tetrahedra::TetMesh m = test::box_tetrahedra(2, 1, 1, edge);
   const std::size_t axes = 3 * m.points.size();
   std::vector<std::uint8_t> held(axes);
   Numbers mirrored(axes);
@@ -86,7 +86,7 @@ TEST(Scrambled, ABodyThatFindsBackInOneStepAnswersForces) {
     mirrored[3 * i] = -2 * m.points[i].x;
   }
   const auto answered = [&](const Numbers& displacement, int inverted) {
-    SolidMotion body(m, std::vector<SolidMaterial>{{young, 0.3, 1e-3}}, {});
+    integrator::SolidMotion body(m, std::vector<fem::SolidMaterial>{{young, 0.3, 1e-3}}, {});
     body.hold(held);
     body.set_state(displacement, Numbers(axes));
     EXPECT_EQ(test::inverted(m, body.places()) > 0, inverted > 0);
@@ -108,27 +108,27 @@ TEST(Scrambled, ABodyThatFindsBackInOneStepAnswersForces) {
 
 /// A bar held at an end whose surface is anywhere, let go while a ball is pressed onto it.
 TEST(Scrambled, BodiesFindBackUnderAnInstrument) {
-  SolidModelOptions options;
+  fem::SolidModelOptions options;
   options.material.materials = {{"gel", 1e-3, 2e4, 1, 0.2, 0.45}};
   options.quadratic = false;
-  Model model = solid_model(test::box_tetrahedra(5, 2, 2, 4), options, {});
-  for (Node& node : model.nodes)
+  model::Model model = fem::solid_model(test::box_tetrahedra(5, 2, 2, 4), options, {});
+  for (model::Node& node : model.nodes)
     if (node.position.x == 0)
-      node.fixed = fixed_all;
-  TetMesh mesh;
-  for (const Node& node : model.nodes)
+      node.fixed = model::fixed_all;
+  tetrahedra::TetMesh mesh;
+  for (const model::Node& node : model.nodes)
     mesh.points.push_back(node.position);
   mesh.tetrahedra = model.tetrahedra;
-  SolidChoice choice;
-  choice.law = SolidLaw::corotational;
-  choice.damping = damping_per_stiffness(0.5, 20);
-  Simulation s(test::one_thread(), {});
-  s.add_object("o", model, Method::ela, {}, Integration::semi_implicit, choice);
+  integrator::SolidChoice choice;
+  choice.law = integrator::SolidLaw::corotational;
+  choice.damping = integrator::damping_per_stiffness(0.5, 20);
+  scene::Simulation s(test::one_thread(), {});
+  s.add_object("o", model, scene::Method::ela, {}, scene::Integration::semi_implicit, choice);
   std::vector<std::uint32_t> moved;
   test::Chance chance{std::mt19937(3)};
-  for (std::uint32_t i = 0; i < surface_count(model); ++i)
+  for (std::uint32_t i = 0; i < model::surface_count(model); ++i)
     if (const Vec3 p = model.nodes[i].position; p.x > 0) {
-      s.apply(SetDisplacement{
+      s.apply(scene::SetDisplacement{
           0, {i}, Vec3{chance.from(2, 20), chance.from(0, 8), chance.from(0, 8)} - p});
       moved.push_back(i);
     }
@@ -142,15 +142,15 @@ TEST(Scrambled, BodiesFindBackUnderAnInstrument) {
     return all;
   };
   EXPECT_GT(test::inverted(mesh, places()), 20);
-  s.apply(Release{0, moved});
-  s.apply(SetInstrument{0, {4, {}, 0}, {{14, 4, 20}, {}}, "probe"});
-  s.apply(MoveInstrument{0, {14, 4, 10}, {}, 0.5}); // 2 mm deep
+  s.apply(scene::Release{0, moved});
+  s.apply(scene::SetInstrument{0, {4, {}, 0}, {{14, 4, 20}, {}}, "probe"});
+  s.apply(scene::MoveInstrument{0, {14, 4, 10}, {}, 0.5}); // 2 mm deep
   for (int n = 0; n < 100; ++n)
     s.step(0.02);
   EXPECT_EQ(test::inverted(mesh, places()), 0);
   EXPECT_GT(s.instrument(0).nodes, 0U);
   EXPECT_GT(s.instrument(0).force.z, 10);
-  s.apply(MoveInstrument{0, {14, 4, 40}, {}, 0});
+  s.apply(scene::MoveInstrument{0, {14, 4, 40}, {}, 0});
   test::settle(s);
   double most = 0;
   for (const double u : test::shape(s, 0))
@@ -159,4 +159,4 @@ TEST(Scrambled, BodiesFindBackUnderAnInstrument) {
 }
 
 } // namespace
-} // namespace gewebe
+} // namespace gewebe::test

@@ -27,33 +27,34 @@
 #include <utility>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::test {
 namespace {
 
 using Nodes = std::vector<std::uint32_t>;
 
 /// A bar 16 × 8 × 8 mm along x, held at x = 0; of quadratic elements fewer.
-Model bar(bool quadratic) {
-  SolidModelOptions options;
+model::Model bar(bool quadratic) {
+  fem::SolidModelOptions options;
   options.material.materials = {{"gel", 1e-3, 2e4, 1, 0.2, 0.4}};
   options.quadratic = quadratic;
   options.drag_rate = 30;
-  Model model = solid_model(
+  model::Model model = fem::solid_model(
       quadratic ? test::box_tetrahedra(2, 1, 1, 8) : test::box_tetrahedra(4, 2, 2, 4), options, {});
-  for (Node& node : model.nodes)
+  for (model::Node& node : model.nodes)
     if (node.position.x == 0)
-      node.fixed = fixed_all;
+      node.fixed = model::fixed_all;
   return model;
 }
 
 /// Columns of the surface nodes, with rows for these alone.
-class SurfaceColumns final : public ColumnSource, public ColumnSink {
+class SurfaceColumns final : public columns::ColumnSource, public columns::ColumnSink {
 public:
-  explicit SurfaceColumns(const Model& model)
-      : count_(model.nodes.size()), nodes_(surface_count(model)) {
+  explicit SurfaceColumns(const model::Model& model)
+      : count_(model.nodes.size()), nodes_(model::surface_count(model)) {
     std::iota(nodes_.begin(), nodes_.end(), 0U);
-    const StiffnessMatrix k = stiffness_matrix(model);
-    (void)compliance_columns(k, Factor(k, {}), stiffness_norm(k), nodes_, {}, *this, nodes_.size());
+    const linalg::StiffnessMatrix k = fem::stiffness_matrix(model);
+    (void)columns::compliance_columns(k, linalg::Factor(k, {}), linalg::stiffness_norm(k), nodes_,
+                                      {}, *this, nodes_.size());
   }
   std::size_t node_count() const override { return count_; }
   std::size_t row_nodes() const override { return nodes_.size(); }
@@ -74,7 +75,7 @@ private:
 /// A method and material law.
 struct Law {
   std::string name;
-  std::function<void(Simulation&)> add;
+  std::function<void(scene::Simulation&)> add;
   double tolerance = 1e-9; ///< of shapes and forces, over their largest number
   bool moves = false;      ///< elastodynamic: compared at rest
 };
@@ -83,66 +84,72 @@ std::ostream& operator<<(std::ostream& out, const Law& law) {
   return out << law.name;
 }
 
-ObjectSource with_columns(const Model& model) {
+scene::ObjectSource with_columns(const model::Model& model) {
   return {[model] { return model; },
-          [](const Model& own) {
-            return compliance_of_store({std::make_unique<SurfaceColumns>(own), [&own] {
-                                          return Factor(stiffness_matrix(own), Context{});
-                                        }});
+          [](const model::Model& own) {
+            return compliance::compliance_of_store(
+                {std::make_unique<SurfaceColumns>(own),
+                 [&own] { return linalg::Factor(fem::stiffness_matrix(own), Context{}); }});
           }};
 }
 
 std::vector<Law> laws() {
-  const auto object = [](const Model& model, Method method,
-                         Integration integration = Integration::semi_implicit,
-                         const SolidChoice& solid = {}) {
-    return [=](Simulation& s) { s.add_object("o", model, method, {}, integration, solid); };
+  const auto object = [](const model::Model& model, scene::Method method,
+                         scene::Integration integration = scene::Integration::semi_implicit,
+                         const integrator::SolidChoice& solid = {}) {
+    return [=](scene::Simulation& s) { s.add_object("o", model, method, {}, integration, solid); };
   };
   std::vector<Law> all{
-      {"net", object(test::organ(1), Method::ffe)},
+      {"net", object(test::organ(1), scene::Method::ffe)},
       {"prepared_net",
-       [](Simulation& s) {
-         s.add_object("o", test::organ(1), Method::ffe);
-         s.apply(Prepare{0});
+       [](scene::Simulation& s) {
+         s.add_object("o", test::organ(1), scene::Method::ffe);
+         s.apply(scene::Prepare{0});
        }},
-      {"linear_solid", object(bar(false), Method::ffe)},
-      {"quadratic_solid", object(bar(true), Method::ffe)},
+      {"linear_solid", object(bar(false), scene::Method::ffe)},
+      {"quadratic_solid", object(bar(true), scene::Method::ffe)},
       {"stored_solid",
-       [](Simulation& s) { s.add_object("o", with_columns(bar(false)), Method::ffe); }},
-      {"two_steps", [](Simulation& s) {
-         Model stiff = test::organ(1);
-         for (Spring& spring : stiff.springs)
+       [](scene::Simulation& s) {
+         s.add_object("o", with_columns(bar(false)), scene::Method::ffe);
+       }},
+      {"two_steps", [](scene::Simulation& s) {
+         model::Model stiff = test::organ(1);
+         for (model::Spring& spring : stiff.springs)
            spring.stiffness *= 3;
-         s.add_object("o", test::organ(1), Method::ffe);
-         s.apply(SetTwoStep{0, {.threshold = 1e4}, {}, std::make_shared<const Model>(stiff)});
+         s.add_object("o", test::organ(1), scene::Method::ffe);
+         s.apply(scene::SetTwoStep{
+             0, {.threshold = 1e4}, {}, std::make_shared<const model::Model>(stiff)});
        }}};
   for (const bool quadratic : {false, true})
     all.push_back({quadratic ? "warped_quadratic_solid" : "warped_linear_solid",
-                   [quadratic](Simulation& s) {
-                     s.add_object("o", bar(quadratic), Method::ffe);
-                     s.apply(SetWarp{0});
+                   [quadratic](scene::Simulation& s) {
+                     s.add_object("o", bar(quadratic), scene::Method::ffe);
+                     s.apply(scene::SetWarp{0});
                    },
                    5e-3}); // an answer starts from the one before, and rounds end at 1e-3
-  for (const SolidLaw law : {SolidLaw::corotational, SolidLaw::hyperelastic}) {
-    SolidChoice choice;
+  for (const integrator::SolidLaw law :
+       {integrator::SolidLaw::corotational, integrator::SolidLaw::hyperelastic}) {
+    integrator::SolidChoice choice;
     choice.law = law;
     choice.tolerance = 1e-6;
-    all.push_back({law == SolidLaw::corotational ? "moving_corotational" : "moving_neo_hookean",
-                   object(bar(false), Method::ela, Integration::semi_implicit, choice), 1e-3,
-                   true});
+    all.push_back(
+        {law == integrator::SolidLaw::corotational ? "moving_corotational" : "moving_neo_hookean",
+         object(bar(false), scene::Method::ela, scene::Integration::semi_implicit, choice), 1e-3,
+         true});
   }
-  all.push_back(
-      {"moving_net", object(test::organ(1), Method::ela, Integration::implicit), 1e-3, true});
+  all.push_back({"moving_net",
+                 object(test::organ(1), scene::Method::ela, scene::Integration::implicit), 1e-3,
+                 true});
   return all;
 }
 
 /// Applies and removes a load.
 struct Kind {
   std::string name;
-  std::function<void(Simulation&)> set, clear;
+  std::function<void(scene::Simulation&)> set, clear;
 };
 
-Nodes far_end(const Model& model, std::size_t count) {
+Nodes far_end(const model::Model& model, std::size_t count) {
   Nodes nodes = test::free_nodes(model);
   std::ranges::stable_sort(nodes, {}, [&](std::uint32_t i) {
     return -model.nodes[i].position.x - 0.1 * model.nodes[i].position.z;
@@ -152,36 +159,36 @@ Nodes far_end(const Model& model, std::size_t count) {
 }
 
 /// \param size of forces, 1e-6 N, and of accelerations
-std::vector<Kind> kinds(const Model& model, double size, bool moves) {
+std::vector<Kind> kinds(const model::Model& model, double size, bool moves) {
   const Nodes end = far_end(model, 4), all = test::free_nodes(model), one{end[1]};
   const auto release = [](const Nodes& nodes) {
-    return [nodes](Simulation& s) { s.apply(Release{0, nodes}); };
+    return [nodes](scene::Simulation& s) { s.apply(scene::Release{0, nodes}); };
   };
   const auto force = [&](const char* name, const Nodes& nodes, const Vec3& f, double period = 0) {
     return Kind{name,
-                [=](Simulation& s) {
-                  s.apply(SetForce{0, nodes, f / static_cast<double>(nodes.size()), period});
+                [=](scene::Simulation& s) {
+                  s.apply(scene::SetForce{0, nodes, f / static_cast<double>(nodes.size()), period});
                 },
                 release(nodes)};
   };
   const auto gravity = [](const char* name, const Vec3& g) {
-    return Kind{name, [=](Simulation& s) { s.apply(SetGravity{g}); },
-                [](Simulation& s) { s.apply(SetGravity{}); }};
+    return Kind{name, [=](scene::Simulation& s) { s.apply(scene::SetGravity{g}); },
+                [](scene::Simulation& s) { s.apply(scene::SetGravity{}); }};
   };
   const auto displace = [&](const char* name, const Nodes& nodes, const Vec3& d) {
     return Kind{name,
-                [=](Simulation& s) {
-                  s.apply(SetDisplacement{0, nodes, d});
+                [=](scene::Simulation& s) {
+                  s.apply(scene::SetDisplacement{0, nodes, d});
                 },
                 release(nodes)};
   };
-  const double weight = total_mass(model);
+  const double weight = model::total_mass(model);
   std::vector<Kind> kinds{gravity("gravity", {0, 0, -size / weight}),
                           force("force", end, {0, 0, -size}),
                           displace("displacement", one, {0, 0, -0.8}),
                           {"pressure",
-                           [=](Simulation& s) {
-                             s.apply(SetPressure{0, end, {40, 0}});
+                           [=](scene::Simulation& s) {
+                             s.apply(scene::SetPressure{0, end, {40, 0}});
                            },
                            release(end)}};
   if (moves)
@@ -192,22 +199,22 @@ std::vector<Kind> kinds(const Model& model, double size, bool moves) {
   kinds.push_back(displace("displacement_of_several", end, {0, 0.5, 0.3}));
   kinds.push_back(force("pulse", end, {0, 0, 1.5 * size}, 0.35));
   Nodes inside;
-  for (std::uint32_t i = static_cast<std::uint32_t>(surface_count(model)); i < model.nodes.size();
-       ++i)
-    if (model.nodes[i].fixed == fixed_none)
+  for (std::uint32_t i = static_cast<std::uint32_t>(model::surface_count(model));
+       i < model.nodes.size(); ++i)
+    if (model.nodes[i].fixed == model::fixed_none)
       inside.push_back(i);
   if (!inside.empty())
     kinds.push_back(force("force_inside", inside, {0, 0, size}));
   for (const double along : {0.5, -0.3}) {
     Kind both = kinds[2];
     both.name += " under gravity of " + std::to_string(along);
-    both.set = [set = both.set, by = along * size / weight](Simulation& s) {
+    both.set = [set = both.set, by = along * size / weight](scene::Simulation& s) {
       set(s);
-      s.apply(SetGravity{{0, by, 0}});
+      s.apply(scene::SetGravity{{0, by, 0}});
     };
-    both.clear = [clear = both.clear](Simulation& s) {
+    both.clear = [clear = both.clear](scene::Simulation& s) {
       clear(s);
-      s.apply(SetGravity{});
+      s.apply(scene::SetGravity{});
     };
     kinds.push_back(both);
   }
@@ -217,10 +224,10 @@ std::vector<Kind> kinds(const Model& model, double size, bool moves) {
 /// Results of an object.
 struct Asked {
   std::vector<double> shape, surface;
-  std::vector<NodeVector> forces;
+  std::vector<contact::NodeVector> forces;
 };
 
-Asked ask(const Simulation& s) {
+Asked ask(const scene::Simulation& s) {
   Asked asked;
   const std::span<const double> surface = s.surface_displacement(0);
   asked.surface.assign(surface.begin(), surface.end());
@@ -250,7 +257,7 @@ INSTANTIATE_TEST_SUITE_P(Laws, SecondLoad, testing::ValuesIn(laws()),
                          [](const auto& of) { return of.param.name; });
 
 /// One step, or enough long steps to bring an elastodynamic object to rest.
-void go_on(Simulation& s, bool moves) {
+void go_on(scene::Simulation& s, bool moves) {
   if (!moves)
     return s.step(0.1);
   for (int k = 0; k < 12; ++k)
@@ -260,11 +267,11 @@ void go_on(Simulation& s, bool moves) {
 TEST_P(SecondLoad, EqualsTheSameLoadOnAFreshObject) {
   const Law& law = GetParam();
   const auto scene = [&] {
-    auto s = std::make_unique<Simulation>(test::one_thread(), SimulationOptions{});
+    auto s = std::make_unique<scene::Simulation>(test::one_thread(), scene::SimulationOptions{});
     law.add(*s);
     return s;
   };
-  const Model model = scene()->model(0);
+  const model::Model model = scene()->model(0);
   const std::vector<Kind> all = kinds(model, model.tetrahedra.empty() ? 2e5 : 1e4, law.moves);
   for (const Kind& second : all) {
     const auto fresh = scene();
@@ -306,4 +313,4 @@ TEST_P(SecondLoad, EqualsTheSameLoadOnAFreshObject) {
 }
 
 } // namespace
-} // namespace gewebe
+} // namespace gewebe::test

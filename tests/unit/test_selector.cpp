@@ -10,25 +10,25 @@
 #include <random>
 #include <set>
 
-namespace gewebe {
+namespace gewebe::test {
 namespace {
 
 using Nodes = std::vector<std::uint32_t>;
 
 /// A 4 × 3 sheet of unit squares (20 nodes, x = i mod 5, y = i / 5) and, far off at -5, 20, 10, an
 /// octahedron (nodes 20 to 25); central nodes 26 to 31.
-const Model& model() {
-  static const Model built = [] {
+const model::Model& model() {
+  static const model::Model built = [] {
     TriangleMesh ball = test::octahedron();
     for (Vec3& p : ball.points)
       p += {-5, 20, 10};
-    return build_model(test::joined(test::sheet(4, 3), ball), {}, Context{}).model;
+    return model::build_model(test::joined(test::sheet(4, 3), ball), {}, Context{}).model;
   }();
   return built;
 }
 
-Nodes select(const std::string& text, const LoadNodeList& load = nullptr) {
-  return select_nodes(model(), parse_selector(text), load);
+Nodes select(const std::string& text, const model::LoadNodeList& load = nullptr) {
+  return model::select_nodes(model(), model::parse_selector(text), load);
 }
 
 Nodes range(std::uint32_t first, std::uint32_t last) {
@@ -39,7 +39,7 @@ Nodes range(std::uint32_t first, std::uint32_t last) {
 }
 
 TEST(Selector, Atoms) {
-  ASSERT_EQ(surface_count(model()), 26U);
+  ASSERT_EQ(model::surface_count(model()), 26U);
   ASSERT_EQ(model().nodes.size(), 33U);
   EXPECT_EQ(select("all"), range(0, 32));
   EXPECT_EQ(select("surface"), range(0, 25));
@@ -89,13 +89,15 @@ TEST(Selector, NumbersAloneAreWhatTheyAreInAnExpression) {
 }
 
 TEST(Selector, CountsThatAreKnownAreNotCounted) {
-  const NodeCounts counts = node_counts(model());
+  const model::NodeCounts counts = model::node_counts(model());
   EXPECT_EQ(counts.surface, 26U);
   EXPECT_EQ(counts.body, 26U);
   for (const char* const text : {"surface", "central", "near:1.2,1.1,0,1", "not z<5", "7"})
-    EXPECT_EQ(select_nodes(model(), counts, parse_selector(text)), select(text)) << text;
-  EXPECT_EQ(select_nodes(model(), {.surface = 5, .body = 26}, parse_selector("surface")),
-            range(0, 4)); // it is they that are taken
+    EXPECT_EQ(model::select_nodes(model(), counts, model::parse_selector(text)), select(text))
+        << text;
+  EXPECT_EQ(
+      model::select_nodes(model(), {.surface = 5, .body = 26}, model::parse_selector("surface")),
+      range(0, 4)); // it is they that are taken
 }
 
 TEST(Selector, PrecedenceIsNotAndOr) {
@@ -109,7 +111,7 @@ TEST(Selector, PrecedenceIsNotAndOr) {
 }
 
 TEST(Selector, FilesComeFromTheCaller) {
-  const LoadNodeList load = [](const std::string& name) -> std::string {
+  const model::LoadNodeList load = [](const std::string& name) -> std::string {
     if (name == "grip")
       return "# the grip\n1, 2 7-9\n\n 12 # one more\n";
     if (name == "a b.txt")
@@ -130,10 +132,10 @@ TEST(Selector, FilesComeFromTheCaller) {
   EXPECT_EQ(test::complaint([&] { select("@none", load); }).substr(0, 5), "none:");
   EXPECT_EQ(test::complaint([&] { select("@lost", load); }).substr(0, 5), "lost:");
   EXPECT_NE(test::complaint([&] { select("@grip"); }).find("no files"), std::string::npos);
-  EXPECT_NE(test::complaint([&] { parse_node_list("1 3-2", "L"); }), "");
-  EXPECT_NE(test::complaint([&] { parse_node_list("1-", "L"); }), "");
-  EXPECT_NE(test::complaint([&] { parse_node_list("4294967296", "L"); }), "");
-  EXPECT_NE(test::complaint([&] { parse_node_list("1;2", "L"); }), "");
+  EXPECT_NE(test::complaint([&] { model::parse_node_list("1 3-2", "L"); }), "");
+  EXPECT_NE(test::complaint([&] { model::parse_node_list("1-", "L"); }), "");
+  EXPECT_NE(test::complaint([&] { model::parse_node_list("4294967296", "L"); }), "");
+  EXPECT_NE(test::complaint([&] { model::parse_node_list("1;2", "L"); }), "");
 }
 
 TEST(Selector, TruthTables) {
@@ -277,7 +279,7 @@ TEST(Selector, SyntaxErrorsNameTheColumn) {
                         {"all surface", 5},
                         {"All", 1},
                         {"z<3\x01", 4}}) {
-    const std::string text = test::complaint([&] { parse_selector(c.text); });
+    const std::string text = test::complaint([&] { model::parse_selector(c.text); });
     EXPECT_NE(text.find("column " + std::to_string(c.column) + ": "), std::string::npos)
         << c.text << " gives " << text;
     EXPECT_EQ(text.find('\n'), std::string::npos);
@@ -285,12 +287,13 @@ TEST(Selector, SyntaxErrorsNameTheColumn) {
   std::string deep;
   for (int i = 0; i < 100000; ++i)
     deep += '(';
-  EXPECT_NE(test::complaint([&] { parse_selector(deep); }).find("too deep"), std::string::npos);
+  EXPECT_NE(test::complaint([&] { model::parse_selector(deep); }).find("too deep"),
+            std::string::npos);
   std::string nots;
   for (int i = 0; i < 100000; ++i)
     nots += "not ";
   EXPECT_EQ(select(nots + "4"), Nodes{4});
-  EXPECT_NO_THROW(parse_selector(std::string(64, '(') + "1" + std::string(64, ')')));
+  EXPECT_NO_THROW(model::parse_selector(std::string(64, '(') + "1" + std::string(64, ')')));
 }
 
 TEST(Selector, WhatTheModelLacksIsAnError) {
@@ -303,4 +306,4 @@ TEST(Selector, WhatTheModelLacksIsAnError) {
 }
 
 } // namespace
-} // namespace gewebe
+} // namespace gewebe::test

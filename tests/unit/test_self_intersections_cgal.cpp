@@ -11,7 +11,7 @@
 
 #include <gtest/gtest.h>
 
-namespace gewebe {
+namespace gewebe::test {
 namespace {
 
 using test::append;
@@ -34,7 +34,7 @@ std::size_t cgal_pairs(const TriangleMesh& mesh) {
 }
 
 void expect_equal(const TriangleMesh& mesh, bool some) {
-  const SelfIntersections found = self_intersections({}, mesh);
+  const mesh::SelfIntersections found = mesh::self_intersections({}, mesh);
   EXPECT_EQ(found.pairs, cgal_pairs(mesh));
   EXPECT_EQ(found.pairs > 0, some);
   EXPECT_EQ(found.degenerate_faces, 0U);
@@ -69,14 +69,14 @@ TEST(SelfIntersectionsCgal, FoldsAndDents) {
 TEST(SelfIntersectionsCgal, MeshesOfNoise) {
   std::size_t with = 0;
   for (std::uint32_t seed = 0; seed < 12; ++seed) {
-    const IsoSurface surface = marching_cubes({}, scenes::noise(8, seed));
+    const surface::IsoSurface surface = surface::marching_cubes({}, scenes::noise(8, seed));
     for (const double epsilon : {0.0, 0.3, 0.5}) {
-      TriangleMesh mesh = snap({}, surface, {epsilon}).mesh;
+      TriangleMesh mesh = surface::snap({}, surface, {epsilon}).mesh;
       std::mt19937 random(seed);
       for (Vec3& p : mesh.points) // shaken, and at a scale beyond a float's
         for (int a = 0; a < 3; ++a)
           p[a] = 1e-12 * (p[a] + static_cast<double>(random() % 1000) / 2500);
-      const SelfIntersections found = self_intersections({}, mesh);
+      const mesh::SelfIntersections found = mesh::self_intersections({}, mesh);
       EXPECT_EQ(found.pairs, cgal_pairs(mesh)) << seed << ", epsilon " << epsilon;
       with += found.pairs > 0 ? 1 : 0;
     }
@@ -85,11 +85,13 @@ TEST(SelfIntersectionsCgal, MeshesOfNoise) {
 }
 
 TEST(SelfIntersections, SameForAnyThreadCount) {
-  const TriangleMesh mesh = snap({}, marching_cubes({}, scenes::noise(20, 3)), {0.5}).mesh;
+  const TriangleMesh mesh =
+      surface::snap({}, surface::marching_cubes({}, scenes::noise(20, 3)), {0.5}).mesh;
   Context one, three;
   one.threads = 1;
   three.threads = 3;
-  const SelfIntersections a = self_intersections(one, mesh), b = self_intersections(three, mesh);
+  const mesh::SelfIntersections a = mesh::self_intersections(one, mesh),
+                                b = mesh::self_intersections(three, mesh);
   EXPECT_EQ(a.faces, b.faces);
   EXPECT_EQ(a.pairs, b.pairs);
   EXPECT_EQ(a.pairs_tested, b.pairs_tested);
@@ -99,9 +101,9 @@ TEST(SelfIntersections, CountsDegenerateFaces) {
   TriangleMesh mesh;
   mesh.points = {{0, 0, 0}, {1, 1, 1}, {3, 3, 3}, {0, 1, 0}};
   mesh.triangles = {{0, 1, 2}, {0, 1, 3}};
-  EXPECT_EQ(self_intersections({}, mesh).degenerate_faces, 1U);
-  EXPECT_EQ(self_intersections({}, {}).pairs, 0U);
+  EXPECT_EQ(mesh::self_intersections({}, mesh).degenerate_faces, 1U);
+  EXPECT_EQ(mesh::self_intersections({}, {}).pairs, 0U);
 }
 
 } // namespace
-} // namespace gewebe
+} // namespace gewebe::test

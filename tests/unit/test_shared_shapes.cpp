@@ -24,11 +24,11 @@
 #include <utility>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::test {
 namespace {
 
 struct ReadFrame {
-  SharedFrame head;
+  formats::SharedFrame head;
   std::vector<std::string> names;
   std::vector<std::vector<double>> positions;
 };
@@ -48,9 +48,9 @@ public:
   /// \param hold called in the midst of it
   template <class Hold>
   std::optional<ReadFrame> read(Hold&& hold) {
-    while (const std::uint64_t now = word(offsetof(SharedHead, sequence))) {
+    while (const std::uint64_t now = word(offsetof(formats::SharedHead, sequence))) {
       const std::size_t place =
-          now % 2 == 1 ? offsetof(SharedHead, odd) : offsetof(SharedHead, even);
+          now % 2 == 1 ? offsetof(formats::SharedHead, odd) : offsetof(formats::SharedHead, even);
       const std::uint64_t offset = word(place), most = word(place + 8);
       if (offset + most > bytes_) {
         (void)::munmap(memory_, bytes_);
@@ -63,7 +63,7 @@ public:
           hold();
         copy[k] = word(offset + 8 * k);
       }
-      if (word(offsetof(SharedHead, begun)) < now + 2)
+      if (word(offsetof(formats::SharedHead, begun)) < now + 2)
         return parsed(copy);
       ++again;
     }
@@ -90,7 +90,7 @@ private:
     ReadFrame frame;
     std::memcpy(&frame.head, bytes, sizeof frame.head);
     for (std::size_t k = 0; k < frame.head.objects; ++k) {
-      SharedObject object;
+      formats::SharedObject object;
       std::memcpy(&object, bytes + sizeof frame.head + k * sizeof object, sizeof object);
       frame.names.emplace_back(bytes + object.name, object.name_bytes);
       std::vector<double>& positions = frame.positions.emplace_back(3 * object.nodes);
@@ -102,7 +102,7 @@ private:
     return frame;
   }
 
-  Descriptor file_;
+  formats::Descriptor file_;
   void* memory_ = nullptr;
   std::size_t bytes_ = 0;
 };
@@ -116,13 +116,13 @@ std::string new_path() {
 }
 
 /// Objects whose coordinates are all the number of the frame.
-void write_number(SharedShapes& shapes, std::uint64_t number, std::size_t nodes,
+void write_number(formats::SharedShapes& shapes, std::uint64_t number, std::size_t nodes,
                   std::size_t objects = 2) {
   std::vector<std::string> names;
   for (std::size_t k = 0; k < objects; ++k)
     names.push_back("object." + std::to_string(k));
   const std::vector<double> positions(3 * nodes, static_cast<double>(number));
-  std::vector<SharedShape> all;
+  std::vector<formats::SharedShape> all;
   for (const std::string& name : names)
     all.push_back({name, positions});
   shapes.write(number, static_cast<double>(number), all, false);
@@ -143,7 +143,7 @@ void expect_whole(const ReadFrame& frame) {
 
 TEST(SharedShapes, NoReaderSeesHalfOfAFrame) {
   const std::string path = new_path();
-  SharedShapes shapes(path);
+  formats::SharedShapes shapes(path);
   constexpr std::size_t readers = 3, wanted = 150;
   constexpr std::chrono::microseconds slower(10); // up to some frames
   std::array<std::size_t, readers> again{};
@@ -191,7 +191,7 @@ TEST(SharedShapes, NoReaderSeesHalfOfAFrame) {
 
 TEST(SharedShapes, AFrameIsOverwrittenByTheOneAfterTheNext) {
   const std::string path = new_path();
-  SharedShapes shapes(path);
+  formats::SharedShapes shapes(path);
   Reader reader(path);
   EXPECT_FALSE(reader.read(at_once));
   write_number(shapes, 1, 30);
@@ -217,10 +217,10 @@ TEST(SharedShapes, AFrameIsOverwrittenByTheOneAfterTheNext) {
 
 TEST(SharedShapes, AnotherLayoutIsAnotherGeneration) {
   const std::string path = new_path();
-  SharedShapes shapes(path);
+  formats::SharedShapes shapes(path);
   Reader reader(path);
   const std::vector<double> two{1, 2, 3, 4, 5, 6}, one{7, 8, 9};
-  const auto generation = [&](const std::vector<SharedShape>& all, bool changed = false) {
+  const auto generation = [&](const std::vector<formats::SharedShape>& all, bool changed = false) {
     shapes.write(1, 0.5, all, changed);
     const ReadFrame frame = reader.read(at_once).value();
     EXPECT_EQ(frame.positions.size(), all.size());
@@ -249,24 +249,24 @@ TEST(SharedShapes, AnotherLayoutIsAnotherGeneration) {
 TEST(SharedShapes, TheFileIsItsOwners) {
   const std::string path = new_path(), left = path + ".left";
   {
-    const SharedShapes shapes(path);
+    const formats::SharedShapes shapes(path);
     struct stat info {};
     ASSERT_EQ(::stat(path.c_str(), &info), 0);
     EXPECT_EQ(info.st_mode & 0777U, 0600U);
-    EXPECT_THROW(SharedShapes{path}, Error);
+    EXPECT_THROW(formats::SharedShapes{path}, Error);
     EXPECT_TRUE(std::filesystem::exists(path));
     std::filesystem::copy_file(path, left);
   }
   EXPECT_FALSE(std::filesystem::exists(path));
   {
-    SharedShapes replaced(left);
+    formats::SharedShapes replaced(left);
     write_number(replaced, 1, 3);
     EXPECT_EQ(Reader(left).read(at_once).value().head.sequence, 1U);
   }
   EXPECT_FALSE(std::filesystem::exists(left));
   std::ofstream(path) << "GWBSHAP";
   try {
-    const SharedShapes shapes(path);
+    const formats::SharedShapes shapes(path);
     FAIL() << "a file of another kind is replaced";
   } catch (const Error& error) {
     EXPECT_EQ(error.place(), path);
@@ -277,4 +277,4 @@ TEST(SharedShapes, TheFileIsItsOwners) {
 }
 
 } // namespace
-} // namespace gewebe
+} // namespace gewebe::test

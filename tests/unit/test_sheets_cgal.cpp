@@ -18,7 +18,7 @@
 #include <random>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::test {
 namespace {
 
 namespace pmp = CGAL::Polygon_mesh_processing;
@@ -26,22 +26,22 @@ using Point = CGAL::Simple_cartesian<double>::Point_3;
 using Mesh = CGAL::Surface_mesh<Point>;
 
 struct Copies : pmp::Default_orientation_visitor {
-  explicit Copies(Sheets& sheets) : sheets_(&sheets) {}
+  explicit Copies(mesh::Sheets& sheets) : sheets_(&sheets) {}
   void duplicated_vertex(std::size_t from, std::size_t) {
     sheets_->origin.push_back(sheets_->origin[from]);
   }
   void polygon_orientation_reversed(std::size_t face) { sheets_->backward[face] ^= 1; }
 
 private:
-  Sheets* sheets_;
+  mesh::Sheets* sheets_;
 };
 
-Sheets cgal_sheets(std::size_t points, const std::vector<Triangle>& triangles) {
+mesh::Sheets cgal_sheets(std::size_t points, const std::vector<Triangle>& triangles) {
   std::vector<Point> at(points, Point(0, 0, 0));
   std::vector<std::array<std::size_t, 3>> faces;
   for (const auto& [a, b, c] : triangles)
     faces.push_back({a, b, c});
-  Sheets sheets;
+  mesh::Sheets sheets;
   sheets.backward.assign(triangles.size(), 0);
   for (std::uint32_t p = 0; p < points; ++p)
     sheets.origin.push_back(p);
@@ -52,14 +52,14 @@ Sheets cgal_sheets(std::size_t points, const std::vector<Triangle>& triangles) {
   return sheets;
 }
 
-HalfEdges cgal_half_edges(std::size_t points, const std::vector<Triangle>& triangles) {
+mesh::HalfEdges cgal_half_edges(std::size_t points, const std::vector<Triangle>& triangles) {
   Mesh mesh;
   for (std::size_t p = 0; p < points; ++p)
     mesh.add_vertex({0, 0, 0});
   for (const auto& [a, b, c] : triangles)
     EXPECT_NE(mesh.add_face(Mesh::Vertex_index(a), Mesh::Vertex_index(b), Mesh::Vertex_index(c)),
               Mesh::null_face());
-  HalfEdges out;
+  mesh::HalfEdges out;
   for (const auto h : mesh.halfedges()) {
     out.target.push_back(mesh.target(h));
     out.next.push_back(mesh.next(h));
@@ -75,7 +75,7 @@ HalfEdges cgal_half_edges(std::size_t points, const std::vector<Triangle>& trian
 /// The soup's faces without those of equal corners, in any order and turned at random.
 std::vector<Triangle> shuffled(std::vector<Triangle> triangles, std::mt19937& random,
                                bool turn_some) {
-  std::erase_if(triangles, has_equal_corners);
+  std::erase_if(triangles, mesh::has_equal_corners);
   std::shuffle(triangles.begin(), triangles.end(), random);
   for (Triangle& t : triangles)
     if (turn_some && random() % 3 == 0)
@@ -103,12 +103,13 @@ std::vector<Triangle> double_cone(std::uint32_t count) {
 }
 
 void expect_as_cgal(std::size_t points, const std::vector<Triangle>& triangles) {
-  const Sheets own = cut_into_sheets(points, triangles), cgal = cgal_sheets(points, triangles);
+  const mesh::Sheets own = mesh::cut_into_sheets(points, triangles),
+                     cgal = cgal_sheets(points, triangles);
   ASSERT_EQ(own.backward, cgal.backward);
   ASSERT_EQ(own.origin, cgal.origin);
   ASSERT_EQ(own.triangles, cgal.triangles);
-  const HalfEdges links = half_edges(own.origin.size(), own.triangles);
-  const HalfEdges from = cgal_half_edges(own.origin.size(), own.triangles);
+  const mesh::HalfEdges links = mesh::half_edges(own.origin.size(), own.triangles);
+  const mesh::HalfEdges from = cgal_half_edges(own.origin.size(), own.triangles);
   ASSERT_EQ(links.target, from.target);
   ASSERT_EQ(links.next, from.next);
   ASSERT_EQ(links.face, from.face);
@@ -129,7 +130,7 @@ TEST(Sheets, AreThoseOfCgalNumberByNumber) {
     triangles = shuffled(triangles, random, true);
     SCOPED_TRACE(n);
     ASSERT_NO_FATAL_FAILURE(expect_as_cgal(points, triangles));
-    const Sheets sheets = cut_into_sheets(points, triangles);
+    const mesh::Sheets sheets = mesh::cut_into_sheets(points, triangles);
     copies += sheets.origin.size() - points;
     turned += static_cast<std::uint64_t>(std::ranges::count(sheets.backward, char{1}));
   }
@@ -151,4 +152,4 @@ TEST(Sheets, AreThoseOfCgalNumberByNumber) {
 }
 
 } // namespace
-} // namespace gewebe
+} // namespace gewebe::test

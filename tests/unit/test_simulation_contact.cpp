@@ -22,27 +22,27 @@
 #include <optional>
 #include <string>
 
-namespace gewebe {
+namespace gewebe::test {
 namespace {
 
 using test::free_nodes, test::organ;
 
-Vec3 moved(const Simulation& s, std::size_t object, std::size_t node) {
+Vec3 moved(const scene::Simulation& s, std::size_t object, std::size_t node) {
   const std::span<const double> u = s.displacement(object);
   return {u[3 * node], u[3 * node + 1], u[3 * node + 2]};
 }
 
-Vec3 place(const Simulation& s, std::size_t object, std::size_t node) {
+Vec3 place(const scene::Simulation& s, std::size_t object, std::size_t node) {
   return s.model(object).nodes[node].position + moved(s, object, node);
 }
 
-SetInstrument sphere(double radius, const Vec3& at, double friction = 0) {
+scene::SetInstrument sphere(double radius, const Vec3& at, double friction = 0) {
   return {0, {radius, {}, friction}, {at, {}}};
 }
 
 /// Of the surface in the instrument, over its radius; what no force moves counts for nothing.
-double depth(const Simulation& s, std::size_t object, const InstrumentShape& shape,
-             const Pose& pose) {
+double depth(const scene::Simulation& s, std::size_t object, const contact::InstrumentShape& shape,
+             const contact::Pose& pose) {
   return test::surface_depth(s.model(object), s.displacement(object), shape, pose);
 }
 
@@ -51,32 +51,33 @@ double depth(const Simulation& s, std::size_t object, const InstrumentShape& sha
 constexpr double gap_allowed = 4e-4;
 
 /// Of all forces on nodes, as they are on points of the surface: norms.
-double sum_of_sizes(const std::vector<NodeVector>& forces) {
+double sum_of_sizes(const std::vector<contact::NodeVector>& forces) {
   double sum = 0;
-  for (const NodeVector& f : forces)
+  for (const contact::NodeVector& f : forces)
     sum += norm(f.value);
   return sum;
 }
 
 /// Both methods, the elastodynamic one by both of its integrations.
-const std::vector<std::pair<Method, Integration>> ways{{Method::ffe, Integration::semi_implicit},
-                                                       {Method::ela, Integration::semi_implicit},
-                                                       {Method::ela, Integration::implicit}};
+const std::vector<std::pair<scene::Method, scene::Integration>> ways{
+    {scene::Method::ffe, scene::Integration::semi_implicit},
+    {scene::Method::ela, scene::Integration::semi_implicit},
+    {scene::Method::ela, scene::Integration::implicit}};
 
 /// The top of the organ of the tests, which is a ball of radius 20 about this.
 const Vec3 middle{100, -50, 30};
 
 /// An organ pressed from above by a sphere, in small steps.
-std::unique_ptr<Simulation> pressed(Method method, double friction, double by, double radius = 8,
-                                    int rounds = 4, int threads = 1,
-                                    Integration integration = Integration::semi_implicit) {
+std::unique_ptr<scene::Simulation>
+pressed(scene::Method method, double friction, double by, double radius = 8, int rounds = 4,
+        int threads = 1, scene::Integration integration = scene::Integration::semi_implicit) {
   Context context;
   context.threads = threads;
-  auto s = std::make_unique<Simulation>(context, SimulationOptions{});
+  auto s = std::make_unique<scene::Simulation>(context, scene::SimulationOptions{});
   s->add_object("o", organ(rounds), method, {}, integration);
   const Vec3 start = middle + Vec3{0.3, 0.2, 20 + radius};
   s->apply(sphere(radius, start, friction));
-  s->apply(MoveInstrument{0, start - Vec3{0, 0, by}, {}, 0.2});
+  s->apply(scene::MoveInstrument{0, start - Vec3{0, 0, by}, {}, 0.2});
   s->step(0.3);
   return s;
 }
@@ -84,23 +85,23 @@ std::unique_ptr<Simulation> pressed(Method method, double friction, double by, d
 TEST(SimulationContact, ASphereOnASheetOfKnownCompliance) {
   // Nodes that hang on three springs each, with no spring between them: u = f / k. Each is the top
   // of a tent whose other corners are held, so that the sphere touches nodes alone.
-  Model m;
+  model::Model m;
   m.name = "sheet";
   m.materials.resize(1);
   m.materials[0].name = "m";
   const double k = 50;
   constexpr std::uint32_t nodes = 49;
-  std::vector<Node> held;
-  const auto hold = [&](Node n, const Vec3& at) {
+  std::vector<model::Node> held;
+  const auto hold = [&](model::Node n, const Vec3& at) {
     n.position = at;
-    n.fixed = fixed_all;
+    n.fixed = model::fixed_all;
     held.push_back(n);
     return static_cast<std::uint32_t>(nodes + held.size() - 1);
   };
   for (int y = -3; y <= 3; ++y)
     for (int x = -3; x <= 3; ++x) {
       const auto node = static_cast<std::uint32_t>(m.nodes.size());
-      Node n;
+      model::Node n;
       n.position = {1.0 * x, 1.0 * y, 0};
       n.mass = 0.01;
       n.drag = 0.5;
@@ -108,7 +109,7 @@ TEST(SimulationContact, ASphereOnASheetOfKnownCompliance) {
       for (int a = 0; a < 3; ++a) {
         Vec3 end = n.position;
         end[a] += 1000; // far: the direction does not turn
-        m.springs.push_back({node, hold(n, end), SpringKind::edge, k, 0, 1000});
+        m.springs.push_back({node, hold(n, end), model::SpringKind::edge, k, 0, 1000});
       }
       std::array<std::uint32_t, 3> foot{};
       for (std::size_t c = 0; c < 3; ++c)
@@ -118,17 +119,17 @@ TEST(SimulationContact, ASphereOnASheetOfKnownCompliance) {
         m.triangles.push_back({node, foot[c], foot[(c + 1) % 3]});
     }
   m.nodes.insert(m.nodes.end(), held.begin(), held.end());
-  check_model(m);
+  model::check_model(m);
   const double radius = 5, down = 0.4;
   // Nodes are pushed by up to 0.6 d_hat less or 0.4 d_hat more than out of the sphere; d_hat is of
   // the slanted edges.
   const double d_hat = 1e-3 * std::hypot(0.3, 1);
   for (const auto& [method, integration] : ways) {
-    Simulation s({}, {});
+    scene::Simulation s({}, {});
     s.add_object("sheet", m, method, {}, integration);
     s.apply(sphere(radius, {0, 0, radius + 1}));
-    s.apply(MoveInstrument{0, {0, 0, radius - down}, {}, 0.5});
-    s.step(method == Method::ffe ? 0.5 : 20);
+    s.apply(scene::MoveInstrument{0, {0, 0, radius - down}, {}, 0.5});
+    s.step(method == scene::Method::ffe ? 0.5 : 20);
     s.step(0.1); // forces are means over a step
     // Each node alone: out of the sphere by the shortest way, as its compliance is the same all
     // around.
@@ -137,16 +138,16 @@ TEST(SimulationContact, ASphereOnASheetOfKnownCompliance) {
     const Vec3 c{0, 0, radius - down};
     // Of k down: the tolerance of forces; what moves still comes to rest, and far springs turn.
     const double exact =
-        (method == Method::ffe ? contact::Parameters{}.force_tolerance : 1e-3) * k * down;
+        (method == scene::Method::ffe ? contact::Parameters{}.force_tolerance : 1e-3) * k * down;
     for (std::uint32_t i = 0; i < nodes; ++i) {
       const Vec3 rest = m.nodes[i].position;
       const double inside = radius - norm(rest - c);
       Vec3 force;
       if (inside > 0)
         force = k * inside / norm(rest - c) * (rest - c);
-      const std::vector<NodeVector>& forces = s.contact_forces(0);
+      const std::vector<contact::NodeVector>& forces = s.contact_forces(0);
       const auto f = std::find_if(forces.begin(), forces.end(),
-                                  [&](const NodeVector& v) { return v.node == i; });
+                                  [&](const contact::NodeVector& v) { return v.node == i; });
       EXPECT_EQ(f != forces.end(), inside > 0) << i;
       EXPECT_LT(norm(k * moved(s, 0, i) - force), inside > 0 ? exact + 0.6 * k * d_hat : exact)
           << i;
@@ -157,7 +158,7 @@ TEST(SimulationContact, ASphereOnASheetOfKnownCompliance) {
       EXPECT_LT(norm(f->value - k * moved(s, 0, i)), exact) << i;
     }
     EXPECT_EQ(touched, 9U);
-    const InstrumentReport tool = s.instrument(0);
+    const scene::InstrumentReport tool = s.instrument(0);
     EXPECT_EQ(tool.nodes, touched);
     EXPECT_LT(norm(tool.force + sum), 1e-12 * norm(sum));
     EXPECT_LT(norm(tool.torque), 1e-9 * norm(sum)); // all forces pass through the centre
@@ -166,39 +167,39 @@ TEST(SimulationContact, ASphereOnASheetOfKnownCompliance) {
 }
 
 TEST(SimulationContact, FrictionlessForcesAreNormalAndBalance) {
-  for (const Method method : {Method::ffe, Method::ela}) {
+  for (const scene::Method method : {scene::Method::ffe, scene::Method::ela}) {
     const auto s = pressed(method, 0, 3);
-    const InstrumentReport tool = s->instrument(0);
+    const scene::InstrumentReport tool = s->instrument(0);
     EXPECT_LT(depth(*s, 0, {8, {}, 0}, tool.pose), test::depth_allowed);
     EXPECT_GT(depth(*s, 0, {8, {}, 0}, tool.pose), -gap_allowed); // touches
     EXPECT_GT(depth(*s, 0, {8.1, {}, 0}, tool.pose), 1e-3); // a larger one would not be kept out
     Vec3 sum;
-    const std::vector<NodeVector>& forces = s->contact_forces(0);
+    const std::vector<contact::NodeVector>& forces = s->contact_forces(0);
     ASSERT_GT(forces.size(), 3U);
     double largest = 0;
-    for (const NodeVector& f : forces) {
+    for (const contact::NodeVector& f : forces) {
       const Vec3 n = (place(*s, 0, f.node) - tool.pose.place) / 8;
       EXPECT_GT(dot(f.value, n), 0);
       sum += f.value;
       largest = test::larger(largest, norm(f.value));
     }
     // All forces pass through the centre.
-    EXPECT_LT(norm(tool.torque), (method == Method::ffe ? 1e-9 : 3e-2) * 8 * norm(sum));
+    EXPECT_LT(norm(tool.torque), (method == scene::Method::ffe ? 1e-9 : 3e-2) * 8 * norm(sum));
     EXPECT_LT(norm(tool.force + sum), 1e-12 * norm(sum));
-    if (method == Method::ela)
+    if (method == scene::Method::ela)
       continue;
     // Reactions of the model's supports balance what the instrument does.
     std::vector<double> f(3 * s->model(0).nodes.size());
-    multiply_stiffness(s->model(0), s->displacement(0), f);
+    fem::multiply_stiffness(s->model(0), s->displacement(0), f);
     Vec3 supports;
     double wrong = 0;
     for (std::uint32_t i = 0; i < s->model(0).nodes.size(); ++i)
       for (int a = 0; a < 3; ++a)
-        if (is_fixed(s->model(0), i, a)) {
+        if (contact::is_fixed(s->model(0), i, a)) {
           supports[a] += f[3 * std::size_t{i} + static_cast<std::size_t>(a)];
         } else {
           double outer = 0;
-          for (const NodeVector& c : forces)
+          for (const contact::NodeVector& c : forces)
             if (c.node == i)
               outer = c.value[a];
           wrong = test::larger(
@@ -212,8 +213,8 @@ TEST(SimulationContact, FrictionlessForcesAreNormalAndBalance) {
 }
 
 TEST(SimulationContact, BothMethodsAgreeAtRest) {
-  const auto still = pressed(Method::ffe, 0, 0.1, 8, 3);
-  const auto moving = pressed(Method::ela, 0, 0.1, 8, 3);
+  const auto still = pressed(scene::Method::ffe, 0, 0.1, 8, 3);
+  const auto moving = pressed(scene::Method::ela, 0, 0.1, 8, 3);
   moving->step(10);
   moving->step(0.1);
   const Vec3 a = still->instrument(0).force, b = moving->instrument(0).force;
@@ -226,8 +227,9 @@ TEST(SimulationContact, ImplicitStepsRestWhereExplicitOnesDo) {
     Vec3 force[2];
     std::vector<double> rest[2];
     for (const int k : {0, 1}) {
-      const auto s = pressed(Method::ela, friction, 2, 8, 3, 1,
-                             k == 0 ? Integration::semi_implicit : Integration::implicit);
+      const auto s =
+          pressed(scene::Method::ela, friction, 2, 8, 3, 1,
+                  k == 0 ? scene::Integration::semi_implicit : scene::Integration::implicit);
       EXPECT_LT(depth(*s, 0, {8, {}, friction}, s->instrument(0).pose), test::depth_allowed)
           << k; // on its way
       s->step(0.5);
@@ -236,7 +238,7 @@ TEST(SimulationContact, ImplicitStepsRestWhereExplicitOnesDo) {
       rest[k].assign(s->displacement(0).begin(), s->displacement(0).end());
       EXPECT_LT(depth(*s, 0, {8, {}, friction}, s->instrument(0).pose), test::depth_allowed);
       double push = 0;
-      for (const NodeVector& f : s->contact_forces(0)) {
+      for (const contact::NodeVector& f : s->contact_forces(0)) {
         const Vec3 n = (place(*s, 0, f.node) - s->instrument(0).pose.place) / 8;
         push += dot(f.value, n);
       }
@@ -259,20 +261,20 @@ TEST(SimulationContact, ImplicitStepsRestWhereExplicitOnesDo) {
 
 TEST(SimulationContact, ShortImplicitStepsGiveTheForcesOfExplicitOnes) {
   for (const double friction : {0.0, 0.3}) {
-    const auto force = [&](Integration integration, double dt) {
-      Simulation s(test::one_thread(), {});
-      s.add_object("o", organ(2), Method::ela, {}, integration);
+    const auto force = [&](scene::Integration integration, double dt) {
+      scene::Simulation s(test::one_thread(), {});
+      s.add_object("o", organ(2), scene::Method::ela, {}, integration);
       const Vec3 start = middle + Vec3{0.3, 0.2, 28};
-      s.apply(SetTimestep{dt});
+      s.apply(scene::SetTimestep{dt});
       s.apply(sphere(8, start, friction));
-      s.apply(MoveInstrument{0, start + Vec3{1, 0, -3}, {}, 0.1});
+      s.apply(scene::MoveInstrument{0, start + Vec3{1, 0, -3}, {}, 0.1});
       s.step(0.04);
       s.step(0.02); // over which forces are means
       return s.instrument(0).force;
     };
-    const Vec3 exact = force(Integration::semi_implicit, 2e-5);
-    const double coarse = norm(force(Integration::implicit, 1e-3) - exact) / norm(exact),
-                 fine = norm(force(Integration::implicit, 2.5e-4) - exact) / norm(exact);
+    const Vec3 exact = force(scene::Integration::semi_implicit, 2e-5);
+    const double coarse = norm(force(scene::Integration::implicit, 1e-3) - exact) / norm(exact),
+                 fine = norm(force(scene::Integration::implicit, 2.5e-4) - exact) / norm(exact);
     EXPECT_LT(fine, 0.02) << friction;
     EXPECT_LT(fine, 0.5 * coarse) << friction; // of first order
   }
@@ -281,14 +283,14 @@ TEST(SimulationContact, ShortImplicitStepsGiveTheForcesOfExplicitOnes) {
 TEST(SimulationContact, AnImplicitStepTakenBackLeavesNoTrace) {
   std::vector<double> results[2];
   for (const bool fails : {false, true}) {
-    SimulationOptions how;
+    scene::SimulationOptions how;
     how.guard = true;
-    Simulation s(test::one_thread(), how);
-    s.add_object("o", organ(2), Method::ela, {}, Integration::implicit);
+    scene::Simulation s(test::one_thread(), how);
+    s.add_object("o", organ(2), scene::Method::ela, {}, scene::Integration::implicit);
     s.apply(sphere(8, middle + Vec3{0.3, 0.2, 26}, 0.3));
     s.step(0.01);
     if (fails) {
-      s.schedule(0.015, CutObject{0, PlaneToCut{{{0, 0, 500}, {0, 0, 1}}, {}}});
+      s.schedule(0.015, scene::CutObject{0, scene::PlaneToCut{{{0, 0, 500}, {0, 0, 1}}, {}}});
       EXPECT_THROW(s.step(0.01), Error);
     }
     for (int k = 0; k < 2; ++k)
@@ -301,20 +303,20 @@ TEST(SimulationContact, AnImplicitStepTakenBackLeavesNoTrace) {
 }
 
 TEST(SimulationContact, FrictionHoldsUpToItsLimit) {
-  for (const Method method : {Method::ffe, Method::ela})
+  for (const scene::Method method : {scene::Method::ffe, scene::Method::ela})
     for (const double friction : {0.2, 5.0}) {
       const auto s = pressed(method, friction, 2, 8, 3);
       const Vec3 from = s->instrument(0).pose.place;
       std::vector<Vec3> was;
       for (std::size_t i = 0; i < s->model(0).nodes.size(); ++i)
         was.push_back(moved(*s, 0, i));
-      s->apply(MoveInstrument{0, from + Vec3{1.5, 0, 0}, {}, 0.5});
+      s->apply(scene::MoveInstrument{0, from + Vec3{1.5, 0, 0}, {}, 0.5});
       s->step(0.5);
-      const InstrumentReport tool = s->instrument(0);
+      const scene::InstrumentReport tool = s->instrument(0);
       EXPECT_LT(depth(*s, 0, {8, {}, 0}, tool.pose), test::depth_allowed);
       Vec3 drag, went;
       double weight = 0;
-      for (const NodeVector& f : s->contact_forces(0)) {
+      for (const contact::NodeVector& f : s->contact_forces(0)) {
         const Vec3 n = (place(*s, 0, f.node) - tool.pose.place) / 8;
         const double fn = dot(f.value, n);
         const Vec3 ft = f.value - fn * n;
@@ -325,7 +327,7 @@ TEST(SimulationContact, FrictionHoldsUpToItsLimit) {
       EXPECT_GT(drag.x, 0); // nodes are dragged along, against their slip
       EXPECT_LT(tool.force.x, 0);
       // The torque of friction, about the centre.
-      if (method == Method::ffe) {
+      if (method == scene::Method::ffe) {
         EXPECT_LE(norm(tool.torque), friction * 8 * sum_of_sizes(s->contact_forces(0)));
       }
       EXPECT_LT(weight, 0);
@@ -333,7 +335,7 @@ TEST(SimulationContact, FrictionHoldsUpToItsLimit) {
       if (friction < 1) {
         EXPECT_GT(norm(tool.torque), 0.5 * friction * 8 * norm(tool.force)); // it slips
         EXPECT_LT(gone, 0.2);
-      } else if (method == Method::ffe) {
+      } else if (method == scene::Method::ffe) {
         EXPECT_NEAR(gone, 1.5, 0.05); // sticks
       } else {
         // The net folds, and its pieces roll on the ball.
@@ -344,23 +346,23 @@ TEST(SimulationContact, FrictionHoldsUpToItsLimit) {
 }
 
 TEST(SimulationContact, NothingIsDoneFarAway) {
-  for (const Method method : {Method::ffe, Method::ela}) {
-    Simulation s({}, {});
+  for (const scene::Method method : {scene::Method::ffe, scene::Method::ela}) {
+    scene::Simulation s({}, {});
     s.add_object("o", organ(), method);
     s.apply(sphere(5, middle + Vec3{60, 0, 0}));
     s.step(0.01);
     for (int k = 0; k < 5; ++k) {
-      s.apply(MoveInstrument{0, middle + Vec3{60, 1.0 * k, 0}, {}, 0.01});
+      s.apply(scene::MoveInstrument{0, middle + Vec3{60, 1.0 * k, 0}, {}, 0.01});
       s.step(0.01);
     }
     EXPECT_EQ(s.counts().integration, 0U);
     EXPECT_EQ(s.counts().elastostatic.updates, 0U);
     EXPECT_TRUE(s.contact_forces(0).empty());
     EXPECT_EQ(s.instrument(0).force, Vec3{});
-    s.apply(MoveInstrument{0, middle + Vec3{22, 0, 0}, {}, 0.01});
+    s.apply(scene::MoveInstrument{0, middle + Vec3{22, 0, 0}, {}, 0.01});
     s.step(0.02);
     EXPECT_FALSE(s.contact_forces(0).empty());
-    s.apply(Withdraw{0});
+    s.apply(scene::Withdraw{0});
     s.step(30);
     EXPECT_TRUE(s.contact_forces(0).empty());
     EXPECT_FALSE(s.instrument(0).present);
@@ -370,9 +372,9 @@ TEST(SimulationContact, NothingIsDoneFarAway) {
 }
 
 TEST(SimulationContact, AContactAtRestCostsNothing) {
-  Simulation s({}, {});
-  s.add_object("moving", organ(), Method::ela);
-  s.add_object("still", organ(), Method::ffe);
+  scene::Simulation s({}, {});
+  s.add_object("moving", organ(), scene::Method::ela);
+  s.add_object("still", organ(), scene::Method::ffe);
   s.apply(sphere(8, middle + Vec3{0.3, 0.2, 27}));
   s.step(50);
   s.step(1); // found at rest
@@ -384,7 +386,7 @@ TEST(SimulationContact, AContactAtRestCostsNothing) {
   EXPECT_EQ(s.counts().elastostatic.updates, updates);
   // It still holds: the mean over a step, of the same forces.
   EXPECT_LE(norm(s.instrument(0).force - force), 1e-15 * norm(force));
-  s.apply(MoveInstrument{0, middle + Vec3{0.3, 0.2, 26.9}, {}, 0.01});
+  s.apply(scene::MoveInstrument{0, middle + Vec3{0.3, 0.2, 26.9}, {}, 0.01});
   s.step(0.02);
   EXPECT_GT(s.counts().integration, steps);
   EXPECT_GT(s.instrument(0).force.z, force.z);
@@ -392,20 +394,21 @@ TEST(SimulationContact, AContactAtRestCostsNothing) {
 
 TEST(SimulationContact, TheForceIsTheMeanOverTheStepWhateverCameBefore) {
   const auto first_force = [](int steps_before, bool refused, bool event) {
-    SimulationOptions how;
+    scene::SimulationOptions how;
     how.guard = true;
-    Simulation s(test::one_thread(), how);
-    s.add_object("o", organ(), Method::ela);
+    scene::Simulation s(test::one_thread(), how);
+    s.add_object("o", organ(), scene::Method::ela);
     const std::uint32_t node = free_nodes(s.model(0))[5];
-    s.apply(SetForce{0, {node}, {0, 0, 1e-9}}); // that it is awake
+    s.apply(scene::SetForce{0, {node}, {0, 0, 1e-9}}); // that it is awake
     for (int k = 0; k < steps_before; ++k)
       s.step(0.001);
     s.apply(sphere(8, middle + Vec3{0.3, 0.2, 26}));
     if (refused) {
-      EXPECT_THROW(s.apply(CutObject{0, PlaneToCut{{{0, 0, 500}, {0, 0, 1}}, {}}}), Error);
+      EXPECT_THROW(s.apply(scene::CutObject{0, scene::PlaneToCut{{{0, 0, 500}, {0, 0, 1}}, {}}}),
+                   Error);
     }
     if (event)
-      s.schedule(s.time() + 0.0004, SetTear{0, 0});
+      s.schedule(s.time() + 0.0004, scene::SetTear{0, 0});
     s.step(0.001);
     return s.instrument(0).force.z;
   };
@@ -422,21 +425,22 @@ TEST(SimulationContact, TheForceIsTheMeanOverTheStepWhateverCameBefore) {
 TEST(SimulationContact, ACutWithinAStepLeavesTheForceItsMean) {
   double force[2]{};
   for (const bool cuts : {false, true}) {
-    Simulation s(test::one_thread(), {});
-    s.add_object("o", organ(), Method::ela);
-    s.add_object("far", test::two_masses(), Method::ela);
+    scene::Simulation s(test::one_thread(), {});
+    s.add_object("o", organ(), scene::Method::ela);
+    s.add_object("far", test::two_masses(), scene::Method::ela);
     s.apply(sphere(8, middle + Vec3{0.3, 0.2, 26}));
     for (int k = 0; k < 20; ++k)
       s.step(0.05);
     // The spring that is cut is of a node on the other side; the contact goes on.
     const std::uint32_t node = free_nodes(s.model(0))[0];
-    const auto spring =
-        std::find_if(s.model(0).springs.begin(), s.model(0).springs.end(), [&](const Spring& one) {
-          return one.kind == SpringKind::bend && (one.i == node || one.j == node);
+    const auto spring = std::find_if(
+        s.model(0).springs.begin(), s.model(0).springs.end(), [&](const model::Spring& one) {
+          return one.kind == model::SpringKind::bend && (one.i == node || one.j == node);
         });
     ASSERT_NE(spring, s.model(0).springs.end());
     if (cuts)
-      s.schedule(s.time() + 0.04, CutObject{0, SpringsToCut{{spring->i}, {spring->j}}});
+      s.schedule(s.time() + 0.04,
+                 scene::CutObject{0, scene::SpringsToCut{{spring->i}, {spring->j}}});
     s.step(0.05);
     force[cuts ? 1 : 0] = s.instrument(0).force.z;
   }
@@ -447,23 +451,23 @@ TEST(SimulationContact, ACutWithinAStepLeavesTheForceItsMean) {
 TEST(SimulationContact, FrictionHoldsWhatRestsOnItAndNoMore) {
   // A triangle of three masses on a box, weight and a pull along y of three tenths of it.
   const double weight = 5000, total = 6 * weight;
-  Model m = test::two_masses(2);
+  model::Model m = test::two_masses(2);
   m.nodes.push_back(m.nodes[0]);
   m.nodes[2].position = {0, 2, 0};
   m.triangles = {{0, 1, 2}};
   for (const std::uint32_t node : {0U, 1U})
-    m.springs.push_back({node, 2, SpringKind::edge, 1, 0, std::sqrt(5.0)});
+    m.springs.push_back({node, 2, model::SpringKind::edge, 1, 0, std::sqrt(5.0)});
   TriangleMesh box = test::divided_box({40, 40, 40}, 1);
   for (Vec3& p : box.points)
     p -= {20, 20, 41};
   for (const double friction : {0.2, 0.5}) {
-    Simulation s(test::one_thread(), {});
-    s.add_object("o", m, Method::ela);
-    InstrumentShape shape{1, {}, friction};
-    shape.core = std::make_shared<const ConvexCore>(box);
-    s.apply(SetInstrument{0, shape, {{0, 0, -3e-3}, {}}});
-    s.apply(SetGravity{{0, 0.3 * weight, -weight}});
-    s.apply(SetTimestep{1e-4});
+    scene::Simulation s(test::one_thread(), {});
+    s.add_object("o", m, scene::Method::ela);
+    contact::InstrumentShape shape{1, {}, friction};
+    shape.core = std::make_shared<const contact::ConvexCore>(box);
+    s.apply(scene::SetInstrument{0, shape, {{0, 0, -3e-3}, {}}});
+    s.apply(scene::SetGravity{{0, 0.3 * weight, -weight}});
+    s.apply(scene::SetTimestep{1e-4});
     s.step(0.03); // it falls a little and comes to lie
     const double duration = 0.01;
     std::vector<Vec3> at{moved(s, 0, 0)}, force;
@@ -495,18 +499,18 @@ TEST(SimulationContact, FrictionHoldsWhatRestsOnItAndNoMore) {
 TEST(SimulationContact, AFastInstrumentDoesNotPassThrough) {
   for (const auto& [method, integration] : ways)
     for (const double over : {0.0, 0.002}) {
-      Simulation s({}, {});
-      s.add_object("o", organ(integration == Integration::implicit ? 3 : 4), method, {},
+      scene::Simulation s({}, {});
+      s.add_object("o", organ(integration == scene::Integration::implicit ? 3 : 4), method, {},
                    integration);
       s.apply(sphere(8, middle + Vec3{0.3, 0.2, 28.5}));
       s.step(0.001);
-      s.apply(MoveInstrument{0, middle + Vec3{0.3, 0.2, 18}, {}, over});
+      s.apply(scene::MoveInstrument{0, middle + Vec3{0.3, 0.2, 18}, {}, over});
       s.step(0.01);
       // What was above is now below it, not on the other side.
-      EXPECT_GT(s.instrument(0).force.z, 0) << method_name(method) << over;
+      EXPECT_GT(s.instrument(0).force.z, 0) << scene::method_name(method) << over;
       EXPECT_LT(depth(s, 0, {8, {}, 0}, s.instrument(0).pose), test::depth_allowed);
       std::uint32_t top = 0;
-      for (std::uint32_t i = 0; i < surface_count(s.model(0)); ++i)
+      for (std::uint32_t i = 0; i < model::surface_count(s.model(0)); ++i)
         if (s.model(0).nodes[i].position.z > s.model(0).nodes[top].position.z)
           top = i;
       EXPECT_LT(place(s, 0, top).z, middle.z + 12);
@@ -514,19 +518,19 @@ TEST(SimulationContact, AFastInstrumentDoesNotPassThrough) {
 }
 
 TEST(SimulationContact, GraspedNodesFollowExactly) {
-  for (const Method method : {Method::ffe, Method::ela}) {
-    Simulation s({}, {});
+  for (const scene::Method method : {scene::Method::ffe, scene::Method::ela}) {
+    scene::Simulation s({}, {});
     s.add_object("o", organ(), method);
-    s.apply(SetInstrument{0, {3, {10, 0, 0}, 0}, {middle + Vec3{0, 0, 22}, {}}});
+    s.apply(scene::SetInstrument{0, {3, {10, 0, 0}, 0}, {middle + Vec3{0, 0, 22}, {}}});
     const std::vector<std::uint32_t> nodes{free_nodes(s.model(0))[3], free_nodes(s.model(0))[8]};
-    s.apply(Grasp{0, nodes, 0});
-    const Pose start{middle + Vec3{0, 0, 22}, {}};
-    const Pose end{middle + Vec3{1, 2, 23}, turn_about({1, 2, 3}, 25)};
-    s.apply(MoveInstrument{0, end.place, end.turn, 0.1});
-    const PoseWay way{start, end, 0, 0.1};
+    s.apply(scene::Grasp{0, nodes, 0});
+    const contact::Pose start{middle + Vec3{0, 0, 22}, {}};
+    const contact::Pose end{middle + Vec3{1, 2, 23}, contact::turn_about({1, 2, 3}, 25)};
+    s.apply(scene::MoveInstrument{0, end.place, end.turn, 0.1});
+    const contact::PoseWay way{start, end, 0, 0.1};
     for (int k = 1; k <= 5; ++k) {
       s.step(0.025);
-      const Pose now = way.at(s.time());
+      const contact::Pose now = way.at(s.time());
       EXPECT_EQ(s.instrument(0).pose, now);
       for (const std::uint32_t node : nodes)
         EXPECT_LT(norm(place(s, 0, node) - now(start.inverse(s.model(0).nodes[node].position))),
@@ -536,9 +540,9 @@ TEST(SimulationContact, GraspedNodesFollowExactly) {
     const Vec3 held = s.contact_forces(0)[0].value + s.contact_forces(0)[1].value;
     EXPECT_GT(norm(held), 0);
     EXPECT_LT(norm(s.instrument(0).force + held), 1e-12 * norm(held));
-    s.apply(Release{0, {nodes[0]}});
+    s.apply(scene::Release{0, {nodes[0]}});
     EXPECT_EQ(s.instrument(0).nodes, 1U);
-    s.apply(MoveInstrument{0, end.place + Vec3{5, 0, 0}, {}, 0});
+    s.apply(scene::MoveInstrument{0, end.place + Vec3{5, 0, 0}, {}, 0});
     s.step(0.01);
     EXPECT_LT(norm(place(s, 0, nodes[1]) -
                    (end(start.inverse(s.model(0).nodes[nodes[1]].position)) + Vec3{5, 0, 0})),
@@ -546,15 +550,15 @@ TEST(SimulationContact, GraspedNodesFollowExactly) {
     EXPECT_GT(norm(place(s, 0, nodes[0]) -
                    (end(start.inverse(s.model(0).nodes[nodes[0]].position)) + Vec3{5, 0, 0})),
               1);
-    s.apply(Withdraw{0});
+    s.apply(scene::Withdraw{0});
     s.step(0.01);
     EXPECT_TRUE(s.contact_forces(0).empty());
-    EXPECT_THROW(s.apply(MoveInstrument{0, {}, {}, 0}), Error);
+    EXPECT_THROW(s.apply(scene::MoveInstrument{0, {}, {}, 0}), Error);
     std::uint32_t fixed = 0;
-    while (s.model(0).nodes[fixed].fixed == fixed_none)
+    while (s.model(0).nodes[fixed].fixed == model::fixed_none)
       ++fixed;
-    s.apply(SetInstrument{0, {3, {}, 0}, {middle + Vec3{0, 0, 30}, {}}});
-    EXPECT_THROW(s.apply(Grasp{0, {fixed}, 0}), Error);
+    s.apply(scene::SetInstrument{0, {3, {}, 0}, {middle + Vec3{0, 0, 30}, {}}});
+    EXPECT_THROW(s.apply(scene::Grasp{0, {fixed}, 0}), Error);
   }
 }
 
@@ -563,10 +567,11 @@ TEST(SimulationContact, TheSameBytesForAnyNumberOfThreads) {
   for (const int threads : {1, 2, 3}) {
     std::vector<double>& r = results.emplace_back();
     for (const auto& [method, integration] : ways) {
-      const int rounds = integration == Integration::implicit ? 3 : 4; // for the sake of its time
+      const int rounds =
+          integration == scene::Integration::implicit ? 3 : 4; // for the sake of its time
       const auto s = pressed(method, 0.3, 2, 8, rounds, threads, integration);
       r.insert(r.end(), s->displacement(0).begin(), s->displacement(0).end());
-      for (const NodeVector& f : s->contact_forces(0))
+      for (const contact::NodeVector& f : s->contact_forces(0))
         r.insert(r.end(), {1.0 * f.node, f.value.x, f.value.y, f.value.z});
     }
     ASSERT_EQ(r.size(), results[0].size());
@@ -575,7 +580,7 @@ TEST(SimulationContact, TheSameBytesForAnyNumberOfThreads) {
 }
 
 /// As large as a liver, and rounder.
-Model liver() {
+model::Model liver() {
   TriangleMesh mesh = test::ball(3, 1);
   for (Vec3& p : mesh.points)
     p = {60 * p.x, 40 * p.y, 25 * p.z};
@@ -583,18 +588,18 @@ Model liver() {
 }
 
 TEST(SimulationContact, DrawnAlongALiver) {
-  const Model model = liver();
+  const model::Model model = liver();
   Box3 box;
-  for (std::size_t i = 0; i < surface_count(model); ++i)
+  for (std::size_t i = 0; i < model::surface_count(model); ++i)
     box.add(model.nodes[i].position);
   const Vec3 c = 0.5 * (box.min + box.max), size = box.size();
   const double radius = 0.15 * box.longest_side();
-  for (const Method method : {Method::ffe, Method::ela})
+  for (const scene::Method method : {scene::Method::ffe, scene::Method::ela})
     for (const double friction : {0.0, 0.3}) {
-      if (method == Method::ela && friction == 0)
+      if (method == scene::Method::ela && friction == 0)
         continue; // it takes its time
       std::vector<std::string> warnings;
-      Simulation s({}, {.warn = [&](const std::string& w) { warnings.push_back(w); }});
+      scene::Simulation s({}, {.warn = [&](const std::string& w) { warnings.push_back(w); }});
       s.add_object("liver", model, method);
       const Vec3 start{c.x - 0.2 * size.x, c.y, box.max.z + radius};
       s.apply(sphere(radius, start, friction));
@@ -604,13 +609,13 @@ TEST(SimulationContact, DrawnAlongALiver) {
         const double x = k / 16.0;
         const Vec3 to{c.x + (0.4 * x - 0.2) * size.x, c.y + 0.1 * size.y * std::sin(6 * x),
                       box.max.z + radius - std::min(1.0, 4 * x) * 0.25 * size.z};
-        s.apply(MoveInstrument{0, to, {}, 0.02});
+        s.apply(scene::MoveInstrument{0, to, {}, 0.02});
         s.step(0.02);
         deepest = test::larger(deepest, depth(s, 0, {radius, {}, 0}, {to, {}}));
-        for (const NodeVector& f : s.contact_forces(0)) {
+        for (const contact::NodeVector& f : s.contact_forces(0)) {
           ++touched;
           const Vec3 n = (place(s, 0, f.node) - to) / radius;
-          EXPECT_GE(dot(f.value, n), method == Method::ffe ? 0 : -1e-2 * norm(f.value));
+          EXPECT_GE(dot(f.value, n), method == scene::Method::ffe ? 0 : -1e-2 * norm(f.value));
         }
       }
       EXPECT_LT(deepest, 6.01e-4 * radius); // as depth_allowed
@@ -627,17 +632,17 @@ TEST(SimulationContact, StrangeScenes) {
     Vec3 at;
     bool held = false; ///< it would have to pass fixed nodes
   };
-  const Model model = organ();
+  const model::Model model = organ();
   const std::uint32_t node = free_nodes(model)[5];
   const Vec3 at = model.nodes[node].position;
-  for (const Method method : {Method::ffe, Method::ela})
+  for (const scene::Method method : {scene::Method::ffe, scene::Method::ela})
     for (const Strange& strange :
          {Strange{"tiny, its centre at a node", 1e-4, at}, Strange{"its centre at a node", 4, at},
           Strange{"huge", 1e5, middle + Vec3{0, 0, 1e5 + 19}},
           Strange{"around all of it", 50, middle, true}, Strange{"in the middle", 10, middle},
           Strange{"on fixed nodes", 6, middle - Vec3{0, 0, 21}, true}}) {
       std::vector<std::string> warnings;
-      Simulation s({}, {.warn = [&](const std::string& w) { warnings.push_back(w); }});
+      scene::Simulation s({}, {.warn = [&](const std::string& w) { warnings.push_back(w); }});
       s.add_object("o", model, method);
       s.apply(sphere(strange.radius, strange.at));
       std::string failure;
@@ -655,28 +660,28 @@ TEST(SimulationContact, StrangeScenes) {
       for (const double u : s.displacement(0))
         ASSERT_TRUE(std::isfinite(u)) << strange.name;
       EXPECT_LT(depth(s, 0, {strange.radius, {}, 0}, {strange.at, {}}), test::depth_allowed)
-          << strange.name << " " << method_name(method);
-      for (const NodeVector& f : s.contact_forces(0))
+          << strange.name << " " << scene::method_name(method);
+      for (const contact::NodeVector& f : s.contact_forces(0))
         EXPECT_GE(dot(f.value, place(s, 0, f.node) - strange.at), 0) << strange.name;
     }
 }
 
 TEST(SimulationContact, TwoInstrumentsAtOneNode) {
-  const Model model = organ();
+  const model::Model model = organ();
   const Vec3 top = middle + Vec3{0, 0, 20};
-  for (const Method method : {Method::ffe, Method::ela})
+  for (const scene::Method method : {scene::Method::ffe, scene::Method::ela})
     for (const double apart : {7.0, 3.0, 1e-3}) { // pinched, overlapping
-      Simulation s({}, {});
+      scene::Simulation s({}, {});
       s.add_object("o", model, method);
       for (const std::size_t k : {0U, 1U}) {
         const Vec3 at = top + Vec3{k == 0 ? -apart : apart, 0, 2};
-        s.apply(SetInstrument{k, {6, {}, 0.1}, {at, {}}, k == 0 ? "left" : "right"});
+        s.apply(scene::SetInstrument{k, {6, {}, 0.1}, {at, {}}, k == 0 ? "left" : "right"});
       }
       for (int k = 0; k < 3; ++k)
         s.step(0.001);
       for (const std::size_t k : {0U, 1U}) {
         EXPECT_LT(depth(s, 0, {6, {}, 0}, s.instrument(k).pose), test::depth_allowed)
-            << method_name(method) << apart;
+            << scene::method_name(method) << apart;
       }
       EXPECT_FALSE(s.contact_forces(0).empty());
     }
@@ -685,16 +690,16 @@ TEST(SimulationContact, TwoInstrumentsAtOneNode) {
 // As a driver does that leads several hands: their order says nothing, and one problem is solved.
 TEST(SimulationContact, InstrumentsMovedAtOnceGoTogether) {
   const auto led = [](bool other_first) {
-    Simulation s(test::one_thread(), {});
-    s.add_object("organ", organ(3), Method::ffe);
+    scene::Simulation s(test::one_thread(), {});
+    s.add_object("organ", organ(3), scene::Method::ffe);
     const Vec3 left = middle + Vec3{-3, 0, 24.5}, right = middle + Vec3{4, 1, 24.5};
-    s.apply(SetInstrument{0, {5, {}, 0.4}, {left, {}}, "left"});
-    s.apply(SetInstrument{1, {5, {}, 0.4}, {right, {}}, "right"});
+    s.apply(scene::SetInstrument{0, {5, {}, 0.4}, {left, {}}, "left"});
+    s.apply(scene::SetInstrument{1, {5, {}, 0.4}, {right, {}}, "right"});
     s.step(0.001);
     const std::uint64_t before = s.counts().contact.steps;
     for (std::size_t k = 0; k < 2; ++k) {
       const std::size_t i = other_first ? 1 - k : k;
-      s.apply(MoveInstrument{i, (i == 0 ? left : right) - Vec3{0.3, 0, 0.5}, {}, 0});
+      s.apply(scene::MoveInstrument{i, (i == 0 ? left : right) - Vec3{0.3, 0, 0.5}, {}, 0});
     }
     s.step(0.001);
     EXPECT_EQ(s.counts().contact.steps - before, 1);
@@ -711,20 +716,20 @@ struct PreparedContact {
   std::uint64_t solves = 0;    ///< behind the preparation
 };
 
-PreparedContact contact_with(const std::optional<Prepare>& prepare) {
-  Simulation s(test::one_thread(), {});
-  s.add_object("organ", organ(3), Method::ffe);
+PreparedContact contact_with(const std::optional<scene::Prepare>& prepare) {
+  scene::Simulation s(test::one_thread(), {});
+  s.add_object("organ", organ(3), scene::Method::ffe);
   if (prepare)
     s.apply(*prepare);
   const std::uint64_t before = s.counts().elastostatic.solves;
   PreparedContact all;
   s.apply(sphere(5, middle + Vec3{0, 0, 26}, 0.3));
   for (int k = 0; k < 8; ++k) {
-    s.apply(MoveInstrument{0, middle + Vec3{0.5 * k, 0.1, 24.3}, {}, 0.001});
+    s.apply(scene::MoveInstrument{0, middle + Vec3{0.5 * k, 0.1, 24.3}, {}, 0.001});
     s.step(0.001);
     const std::span<const double> u = s.displacement(0);
     all.answers.insert(all.answers.end(), u.begin(), u.end());
-    for (const NodeVector& f : s.contact_forces(0))
+    for (const contact::NodeVector& f : s.contact_forces(0))
       all.answers.insert(all.answers.end(), {f.value.x, f.value.y, f.value.z});
   }
   all.solves = s.counts().elastostatic.solves - before;
@@ -734,11 +739,11 @@ PreparedContact contact_with(const std::optional<Prepare>& prepare) {
 TEST(SimulationContact, PreparedContactsAreTheSameAndSolveNothing) {
   const PreparedContact plain = contact_with(std::nullopt);
   EXPECT_GT(plain.solves, 0);
-  Prepare prepare{.object = 0, .contact = true, .cut = false, .nodes_ahead = {}};
+  scene::Prepare prepare{.object = 0, .contact = true, .cut = false, .nodes_ahead = {}};
   const PreparedContact factor = contact_with(prepare);
   EXPECT_EQ(factor.solves, plain.solves);
-  const Model model = organ(3);
-  for (std::uint32_t i = 0; i < surface_count(model); ++i)
+  const model::Model model = organ(3);
+  for (std::uint32_t i = 0; i < model::surface_count(model); ++i)
     prepare.nodes_ahead.push_back(i);
   const PreparedContact columns = contact_with(prepare);
   EXPECT_EQ(columns.solves, 0);
@@ -752,20 +757,21 @@ TEST(SimulationContact, PreparedContactsAreTheSameAndSolveNothing) {
 }
 
 TEST(SimulationContact, PreparedContactsReadNoCompressedColumns) {
-  const Model model = organ(3);
-  const StiffnessMatrix k = stiffness_matrix(model);
-  const Factor factor(k, {});
+  const model::Model model = organ(3);
+  const linalg::StiffnessMatrix k = fem::stiffness_matrix(model);
+  const linalg::Factor factor(k, {});
   std::vector<Vec3> positions;
   std::vector<std::uint32_t> nodes;
   for (std::uint32_t i = 0; i < model.nodes.size(); ++i) {
     positions.push_back(model.nodes[i].position);
-    if (i < surface_count(model))
+    if (i < model::surface_count(model))
       nodes.push_back(i);
   }
-  const CompressedMade made = compress_columns(
+  const columns::CompressedMade made = columns::compress_columns(
       positions, nodes, 1e-6,
-      [&](std::span<const std::uint32_t> of, ColumnSink& sink) {
-        return compliance_columns(k, factor, stiffness_norm(k), of, {}, sink, positions.size());
+      [&](std::span<const std::uint32_t> of, columns::ColumnSink& sink) {
+        return columns::compliance_columns(k, factor, linalg::stiffness_norm(k), of, {}, sink,
+                                           positions.size());
       },
       {});
   const std::size_t chunks = made.layout.with_columns;
@@ -773,25 +779,25 @@ TEST(SimulationContact, PreparedContactsReadNoCompressedColumns) {
   std::vector<std::vector<double>> answers;
   for (const bool prepared : {false, true}) {
     std::size_t reads = 0;
-    Simulation s(test::one_thread(), {});
-    s.add_object(
-        "organ", model, Method::ffe,
-        compliance_of_store({std::make_unique<CompressedColumns>(made.layout, model.nodes.size(),
-                                                                 [&](std::size_t chunk) {
-                                                                   ++reads;
-                                                                   return made.chunks[chunk];
-                                                                 }),
-                             [&] { return Factor(k, Context{}); }}));
+    scene::Simulation s(test::one_thread(), {});
+    s.add_object("organ", model, scene::Method::ffe,
+                 compliance::compliance_of_store(
+                     {std::make_unique<columns::CompressedColumns>(made.layout, model.nodes.size(),
+                                                                   [&](std::size_t chunk) {
+                                                                     ++reads;
+                                                                     return made.chunks[chunk];
+                                                                   }),
+                      [&] { return linalg::Factor(k, Context{}); }}));
     if (prepared)
-      s.apply(Prepare{.object = 0, .contact = true, .cut = false, .nodes_ahead = {}});
+      s.apply(scene::Prepare{.object = 0, .contact = true, .cut = false, .nodes_ahead = {}});
     const std::size_t before = reads;
     EXPECT_EQ(before, prepared ? chunks : 0);
     s.apply(sphere(5, middle + Vec3{0, 0, 26}));
     std::vector<double>& all = answers.emplace_back();
     for (int step = 0; step < 6; ++step) {
-      s.apply(MoveInstrument{0, middle + Vec3{0.5 * step, 0.1, 24.3}, {}, 0.001});
+      s.apply(scene::MoveInstrument{0, middle + Vec3{0.5 * step, 0.1, 24.3}, {}, 0.001});
       s.step(0.001);
-      for (const NodeVector& f : s.contact_forces(0))
+      for (const contact::NodeVector& f : s.contact_forces(0))
         all.insert(all.end(), {f.value.x, f.value.y, f.value.z});
     }
     EXPECT_EQ(prepared, reads == before);
@@ -802,11 +808,11 @@ TEST(SimulationContact, PreparedContactsReadNoCompressedColumns) {
 
 TEST(SimulationContact, ColumnsThatDoNotFitAreNotPrepared) {
   Context context = test::one_thread();
-  const Model model = organ(3);
+  const model::Model model = organ(3);
   context.max_memory = 64 * 9 * sizeof(double) * model.nodes.size(); // 16 nodes' columns
-  Simulation s(context, {});
-  s.add_object("organ", model, Method::ffe);
-  Prepare prepare{.object = 0, .contact = true, .cut = false, .nodes_ahead = {}};
+  scene::Simulation s(context, {});
+  s.add_object("organ", model, scene::Method::ffe);
+  scene::Prepare prepare{.object = 0, .contact = true, .cut = false, .nodes_ahead = {}};
   for (std::uint32_t i = 0; i < 17; ++i)
     prepare.nodes_ahead.push_back(i);
   EXPECT_THROW(s.apply(prepare), Error);
@@ -817,35 +823,35 @@ TEST(SimulationContact, ColumnsThatDoNotFitAreNotPrepared) {
 // Steps in which forces are not found, since springs bend too far in them for their rounds, throw a
 // net about no more than an instrument pushes it: they are taken in halves.
 TEST(SimulationContact, LongStepsOfANetWinNoEnergy) {
-  Model model = organ(3);
-  for (Spring& spring : model.springs)
+  model::Model model = organ(3);
+  for (model::Spring& spring : model.springs)
     spring.damping = 0;
-  for (Node& node : model.nodes)
+  for (model::Node& node : model.nodes)
     node.drag = 0;
   const double step = 0.02;
-  Simulation s(test::one_thread(), {});
-  s.add_object("o", std::move(model), Method::ela, {}, Integration::implicit);
-  s.apply(SetTimestep{step});
+  scene::Simulation s(test::one_thread(), {});
+  s.add_object("o", std::move(model), scene::Method::ela, {}, scene::Integration::implicit);
+  s.apply(scene::SetTimestep{step});
   const auto place = [](double deep) { return Vec3{100, -49.5, 30 + 25.2 - deep}; };
-  s.apply(SetInstrument{0, {5, {}, 0}, {place(0), {}}, "probe"});
+  s.apply(scene::SetInstrument{0, {5, {}, 0}, {place(0), {}}, "probe"});
   s.step(0);
   double work = 0, given = 0, most = 0;
   Vec3 last = place(0);
   for (int k = 1; k <= 60; ++k) {
     const Vec3 to = place(2.5 * std::sin(k * 3.14159265358979323846 / 60)); // down and up again
-    s.apply(MoveInstrument{0, to, {}, step});
+    s.apply(scene::MoveInstrument{0, to, {}, step});
     s.step(step);
     work -= dot(s.instrument(0).force, to - last);
     last = to;
     given = test::larger(given, work);
-    const SimulationState state = s.state();
+    const scene::SimulationState state = s.state();
     most = test::larger(most, state.kinetic_energy + state.elastic_energy);
   }
-  const SimulationState state = s.state();
+  const scene::SimulationState state = s.state();
   EXPECT_GT(given, 0);
   EXPECT_LT(most, 1.5 * given); // else over 100 times that
   EXPECT_LT(state.kinetic_energy + state.elastic_energy, 0.3 * given);
 }
 
 } // namespace
-} // namespace gewebe
+} // namespace gewebe::test

@@ -11,30 +11,30 @@
 #include <string>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::test {
 namespace {
 
 using test::count, test::highest, test::incision, test::lobe_off, test::one_thread, test::shape,
     test::soft_organ, test::free_nodes, test::organ;
 
 TEST(SimulationCut, AnElastostaticShapeIsThatOfTheCutModel) {
-  Simulation s(one_thread(), {});
-  s.add_object("organ", organ(3), Method::ffe);
+  scene::Simulation s(one_thread(), {});
+  s.add_object("organ", organ(3), scene::Method::ffe);
   const std::uint32_t node = free_nodes(s.model(0))[20];
-  s.apply(SetForce{0, {node}, {0, 40, 25}});
-  s.apply(SetDisplacement{0, {highest(s.model(0))}, {0, 0, 0.5}});
+  s.apply(scene::SetForce{0, {node}, {0, 40, 25}});
+  s.apply(scene::SetDisplacement{0, {highest(s.model(0))}, {0, 0, 0.5}});
   s.step(0.1);
   const std::vector<double> before = shape(s, 0);
-  s.apply(CutObject{0, incision(s.model(0))});
-  ASSERT_EQ(count(s, Cutting::Kind::cut), 1U);
+  s.apply(scene::CutObject{0, incision(s.model(0))});
+  ASSERT_EQ(count(s, scene::Cutting::Kind::cut), 1U);
   EXPECT_GT(s.news().cuttings[0].doubled, 2U);
   s.step(0.1);
-  EXPECT_EQ(count(s, Cutting::Kind::loose), 0U);
+  EXPECT_EQ(count(s, scene::Cutting::Kind::loose), 0U);
   const std::vector<double> after = shape(s, 0);
   ASSERT_EQ(after.size(), 3 * s.model(0).nodes.size());
   // Afresh.
-  Load load{};
-  const Model& model = s.model(0);
+  contact::Load load{};
+  const model::Model& model = s.model(0);
   const std::span<const std::uint32_t> first = s.object(0).first_nodes;
   std::vector<double> mass(s.first_model(0).nodes.size());
   for (std::uint32_t i = 0; i < model.nodes.size(); ++i) {
@@ -43,7 +43,7 @@ TEST(SimulationCut, AnElastostaticShapeIsThatOfTheCutModel) {
     if (first[i] == highest(s.first_model(0)))
       load.displacement[i] = {0, 0, 0.5};
   }
-  Elastostatic fresh(model, {}, one_thread());
+  statics::Elastostatic fresh(model, {}, one_thread());
   fresh.update(load);
   const std::span<const double> want = fresh.displacement();
   double largest = 0, worst = 0, opened = 0;
@@ -52,27 +52,28 @@ TEST(SimulationCut, AnElastostaticShapeIsThatOfTheCutModel) {
     worst = test::larger(worst, std::abs(want[i] - after[i]));
   }
   EXPECT_LT(worst, 1e-8 * largest);
-  for (std::size_t i = 0; i < before.size() && i < 3 * surface_count(s.first_model(0)); ++i)
+  for (std::size_t i = 0; i < before.size() && i < 3 * model::surface_count(s.first_model(0)); ++i)
     opened = test::larger(opened, std::abs(before[i] - after[i]));
   EXPECT_GT(opened, 1e-4 * largest); // it does matter
 }
 
 TEST(SimulationCut, NothingMovesWhereNothingIsSeveredThatCarries) {
   // A closed wound answers as before: copies that are displaced alike.
-  Simulation s(one_thread(), {});
-  s.add_object("organ", organ(2, false), Method::ffe);
-  const PlaneToCut cut = incision(s.model(0));
+  scene::Simulation s(one_thread(), {});
+  s.add_object("organ", organ(2, false), scene::Method::ffe);
+  const scene::PlaneToCut cut = incision(s.model(0));
   std::vector<std::uint32_t> near;
-  for (const auto& [i, j] : plane_cut(s.model(0), cut.plane, *cut.nodes).edges)
+  for (const auto& [i, j] : cutting::plane_cut(s.model(0), cut.plane, *cut.nodes).edges)
     near.insert(near.end(), {i, j});
   std::sort(near.begin(), near.end());
   near.erase(std::unique(near.begin(), near.end()), near.end());
-  std::erase_if(near, [&](std::uint32_t i) { return s.model(0).nodes[i].fixed != fixed_none; });
-  s.apply(SetDisplacement{0, near, {0.1, 0.2, 0.3}});
+  std::erase_if(near,
+                [&](std::uint32_t i) { return s.model(0).nodes[i].fixed != model::fixed_none; });
+  s.apply(scene::SetDisplacement{0, near, {0.1, 0.2, 0.3}});
   s.step(0.1);
   const std::vector<double> before = shape(s, 0);
-  const std::size_t centrals = s.model(0).nodes.size() - surface_count(s.model(0));
-  s.apply(CutObject{0, cut});
+  const std::size_t centrals = s.model(0).nodes.size() - model::surface_count(s.model(0));
+  s.apply(scene::CutObject{0, cut});
   s.step(0.1);
   const std::vector<double> after = shape(s, 0);
   // Central springs that the plane severs count, so only where there are none.
@@ -81,7 +82,7 @@ TEST(SimulationCut, NothingMovesWhereNothingIsSeveredThatCarries) {
     for (std::size_t a = 0; a < 3; ++a)
       EXPECT_EQ(after[3 * std::size_t{node} + a], before[3 * std::size_t{node} + a]);
   for (std::uint32_t i = 0; i < s.object(0).first_nodes.size(); ++i)
-    if (i >= surface_count(s.first_model(0)) && i < surface_count(s.model(0))) {
+    if (i >= model::surface_count(s.first_model(0)) && i < model::surface_count(s.model(0))) {
       for (std::size_t a = 0; a < 3; ++a)
         EXPECT_EQ(after[3 * std::size_t{i} + a],
                   before[3 * std::size_t{s.object(0).first_nodes[i]} + a]);
@@ -89,20 +90,20 @@ TEST(SimulationCut, NothingMovesWhereNothingIsSeveredThatCarries) {
 }
 
 TEST(SimulationCut, ALobeComesOffAndFalls) {
-  for (const Method method : {Method::ffe, Method::ela}) {
-    Simulation s(one_thread(), {});
+  for (const scene::Method method : {scene::Method::ffe, scene::Method::ela}) {
+    scene::Simulation s(one_thread(), {});
     s.add_object("organ", soft_organ(), method);
-    s.apply(SetGravity{{0, 0, -9810}});
+    s.apply(scene::SetGravity{{0, 0, -9810}});
     s.step(0.02);
-    const double mass = total_mass(s.model(0));
+    const double mass = model::total_mass(s.model(0));
     s.schedule(0.03, lobe_off());
     s.step(0.02);
     ASSERT_EQ(s.object_count(), 2U);
     EXPECT_EQ(s.object(1).name, "organ.1");
-    EXPECT_EQ(s.object(1).method, Method::ela);
-    EXPECT_EQ(count(s, Cutting::Kind::cut), 1U);
-    EXPECT_EQ(count(s, Cutting::Kind::part), 1U);
-    EXPECT_NEAR(total_mass(s.model(0)) + total_mass(s.model(1)), mass, 1e-12 * mass);
+    EXPECT_EQ(s.object(1).method, scene::Method::ela);
+    EXPECT_EQ(count(s, scene::Cutting::Kind::cut), 1U);
+    EXPECT_EQ(count(s, scene::Cutting::Kind::part), 1U);
+    EXPECT_NEAR(model::total_mass(s.model(0)) + model::total_mass(s.model(1)), mass, 1e-12 * mass);
     s.take_news();
     const auto height = [&] {
       const std::vector<double> u = shape(s, 1);
@@ -123,16 +124,16 @@ TEST(SimulationCut, ALobeComesOffAndFalls) {
 }
 
 TEST(SimulationCut, APartGoesOnWithItsMomentum) {
-  Simulation s(one_thread(), {});
-  Model model = organ(3);
-  for (Node& n : model.nodes) {
-    n.fixed = fixed_none;
+  scene::Simulation s(one_thread(), {});
+  model::Model model = organ(3);
+  for (model::Node& n : model.nodes) {
+    n.fixed = model::fixed_none;
     n.drag = 0;
   }
-  s.add_object("organ", model, Method::ela);
-  s.apply(SetGravity{{100, 0, 0}});
+  s.add_object("organ", model, scene::Method::ela);
+  s.apply(scene::SetGravity{{100, 0, 0}});
   s.step(0.5);
-  s.apply(SetGravity{{}});
+  s.apply(scene::SetGravity{{}});
   s.apply(lobe_off());
   ASSERT_EQ(s.object_count(), 2U);
   const auto middle = [&](std::size_t object) {
@@ -155,15 +156,15 @@ TEST(SimulationCut, APartGoesOnWithItsMomentum) {
 }
 
 TEST(SimulationCut, LoadsGripsAndEventsFollowTheirNodes) {
-  Simulation s(one_thread(), {});
-  s.add_object("organ", soft_organ(), Method::ela);
+  scene::Simulation s(one_thread(), {});
+  s.add_object("organ", soft_organ(), scene::Method::ela);
   const std::uint32_t top = highest(s.model(0)), low = free_nodes(s.model(0))[0];
   ASSERT_LT(s.model(0).nodes[low].position.z, 40);
   constexpr std::size_t probe = 0;
-  s.apply(SetInstrument{probe, {1, {}, 0}, {{100, -50, 80}, {}}});
-  s.apply(Grasp{0, {top}, probe});
-  s.apply(SetForce{0, {low}, {5, 0, 0}});
-  s.schedule(0.05, Release{0, {low, top}});
+  s.apply(scene::SetInstrument{probe, {1, {}, 0}, {{100, -50, 80}, {}}});
+  s.apply(scene::Grasp{0, {top}, probe});
+  s.apply(scene::SetForce{0, {low}, {5, 0, 0}});
+  s.schedule(0.05, scene::Release{0, {low, top}});
   s.step(0.01);
   s.apply(lobe_off());
   s.step(0.01);
@@ -172,7 +173,7 @@ TEST(SimulationCut, LoadsGripsAndEventsFollowTheirNodes) {
   EXPECT_EQ(s.contact_forces(1).size(), 1U); // the probe holds the lobe
   EXPECT_EQ(s.instrument(probe).nodes, 1U);
   EXPECT_EQ(s.pending(), 2U); // one for each object
-  s.apply(MoveInstrument{probe, {100, -50, 90}, {}, 0});
+  s.apply(scene::MoveInstrument{probe, {100, -50, 90}, {}, 0});
   s.step(0.01);
   const std::uint32_t held = s.contact_forces(1)[0].node;
   EXPECT_NEAR(shape(s, 1)[3 * held + 2], 10, 1e-9);
@@ -183,33 +184,33 @@ TEST(SimulationCut, LoadsGripsAndEventsFollowTheirNodes) {
 
 TEST(SimulationCut, AnEventThatCutsKeepsItsOwnNodes) {
   // Every time it takes the springs of a band; what is behind the copies is numbered anew.
-  Simulation s(one_thread(), {});
-  s.add_object("organ", soft_organ(), Method::ela);
-  const std::size_t surface = surface_count(s.model(0)), nodes = s.model(0).nodes.size();
+  scene::Simulation s(one_thread(), {});
+  s.add_object("organ", soft_organ(), scene::Method::ela);
+  const std::size_t surface = model::surface_count(s.model(0)), nodes = s.model(0).nodes.size();
   std::vector<std::uint32_t> centrals;
   for (std::size_t i = surface; i < nodes; ++i)
     centrals.push_back(static_cast<std::uint32_t>(i));
-  s.schedule(s.time(), CutObject{0, incision(s.model(0))}, 0.01);
-  s.schedule(s.time(), SetForce{0, centrals, {1, 0, 0}}, 0.01);
+  s.schedule(s.time(), scene::CutObject{0, incision(s.model(0))}, 0.01);
+  s.schedule(s.time(), scene::SetForce{0, centrals, {1, 0, 0}}, 0.01);
   s.step(0.01);
   ASSERT_GT(s.model(0).nodes.size(), nodes); // copies came between
-  s.apply(Release{0, free_nodes(s.model(0))});
+  s.apply(scene::Release{0, free_nodes(s.model(0))});
   EXPECT_THROW(s.step(0.01), Error); // it is open already
   // The force that follows it is on the centrals, wherever they are.
   for (std::uint32_t i = 0; i < s.model(0).nodes.size(); ++i) {
-    const bool central = i >= surface_count(s.model(0));
+    const bool central = i >= model::surface_count(s.model(0));
     EXPECT_EQ(central, s.object(0).first_nodes[i] >= surface) << i;
   }
 }
 
 TEST(SimulationCut, AnEventInFlightIsFollowedIntoWhatComesOff) {
-  Simulation s(one_thread(), {});
-  s.add_object("organ", soft_organ(), Method::ela);
+  scene::Simulation s(one_thread(), {});
+  s.add_object("organ", soft_organ(), scene::Method::ela);
   std::vector<std::uint32_t> all(s.model(0).nodes.size());
   for (std::uint32_t i = 0; i < all.size(); ++i)
     all[i] = i;
-  CutObject cut = lobe_off();
-  std::get<PlaneToCut>(cut.what).nodes = all;
+  scene::CutObject cut = lobe_off();
+  std::get<scene::PlaneToCut>(cut.what).nodes = all;
   s.schedule(s.time(), cut, 0.01);
   s.step(0.01);
   ASSERT_EQ(s.object_count(), 2U);
@@ -223,19 +224,19 @@ TEST(SimulationCut, AnEventInFlightIsFollowedIntoWhatComesOff) {
 }
 
 TEST(SimulationCut, WhatHangsLooselyGoesOnElastodynamic) {
-  const Model model = test::shell();
+  const model::Model model = test::shell();
   std::vector<std::string> warnings;
-  SimulationOptions how;
+  scene::SimulationOptions how;
   how.warn = [&](const std::string& text) { warnings.push_back(text); };
   how.guard = true;
-  Simulation s(one_thread(), how);
-  s.add_object("organ", model, Method::ffe);
-  s.apply(SetGravity{{0, 0, -1}});
+  scene::Simulation s(one_thread(), how);
+  s.add_object("organ", model, scene::Method::ffe);
+  s.apply(scene::SetGravity{{0, 0, -1}});
   s.step(0.01);
-  s.apply(CutObject{0, test::all_but_one(model, highest(model))});
+  s.apply(scene::CutObject{0, test::all_but_one(model, highest(model))});
   s.step(0.01);
-  ASSERT_EQ(count(s, Cutting::Kind::loose), 1U);
-  EXPECT_EQ(s.object(0).method, Method::ela);
+  ASSERT_EQ(count(s, scene::Cutting::Kind::loose), 1U);
+  EXPECT_EQ(s.object(0).method, scene::Method::ela);
   ASSERT_EQ(warnings.size(), 1U);
   EXPECT_NE(warnings[0].find("goes on elastodynamic"), std::string::npos);
   s.step(0.1);
@@ -244,39 +245,40 @@ TEST(SimulationCut, WhatHangsLooselyGoesOnElastodynamic) {
 }
 
 TEST(SimulationCut, WhatHangsLooselyIsHeldByWhatDisplacesIt) {
-  const Model model = test::shell();
-  Simulation s(one_thread(), {.guard = true});
-  s.add_object("organ", model, Method::ffe);
-  s.apply(SetGravity{{0, 0, -1}});
+  const model::Model model = test::shell();
+  scene::Simulation s(one_thread(), {.guard = true});
+  s.add_object("organ", model, scene::Method::ffe);
+  s.apply(scene::SetGravity{{0, 0, -1}});
   s.step(0.01);
-  s.apply(CutObject{0, test::all_but_one(model, highest(model))});
-  std::vector<std::uint32_t> all(surface_count(s.model(0)));
+  s.apply(scene::CutObject{0, test::all_but_one(model, highest(model))});
+  std::vector<std::uint32_t> all(model::surface_count(s.model(0)));
   for (std::uint32_t i = 0; i < all.size(); ++i)
     all[i] = i;
-  std::erase_if(all, [&](std::uint32_t i) { return s.model(0).nodes[i].fixed != fixed_none; });
-  s.apply(SetDisplacement{0, all, {0, 0, 0.25}});
+  std::erase_if(all,
+                [&](std::uint32_t i) { return s.model(0).nodes[i].fixed != model::fixed_none; });
+  s.apply(scene::SetDisplacement{0, all, {0, 0, 0.25}});
   s.step(0.01);
-  EXPECT_EQ(count(s, Cutting::Kind::loose), 0U);
-  EXPECT_EQ(s.object(0).method, Method::ffe);
+  EXPECT_EQ(count(s, scene::Cutting::Kind::loose), 0U);
+  EXPECT_EQ(s.object(0).method, scene::Method::ffe);
   for (const std::uint32_t node : all)
     EXPECT_EQ(shape(s, 0)[3 * node + 2], 0.25);
-  s.apply(Release{0, all});
+  s.apply(scene::Release{0, all});
   s.step(0.01);
-  EXPECT_EQ(count(s, Cutting::Kind::loose), 1U);
-  EXPECT_EQ(s.object(0).method, Method::ela);
+  EXPECT_EQ(count(s, scene::Cutting::Kind::loose), 1U);
+  EXPECT_EQ(s.object(0).method, scene::Method::ela);
 }
 
 TEST(SimulationCut, RestoreMakesItWholeAgain) {
-  for (const Method method : {Method::ffe, Method::ela}) {
-    Simulation s(one_thread(), {}), never(one_thread(), {});
-    for (Simulation* one : {&s, &never}) {
+  for (const scene::Method method : {scene::Method::ffe, scene::Method::ela}) {
+    scene::Simulation s(one_thread(), {}), never(one_thread(), {});
+    for (scene::Simulation* one : {&s, &never}) {
       one->add_object("organ", organ(3), method);
-      one->apply(SetForce{0, {free_nodes(one->model(0))[20]}, {0, 10, 5}});
+      one->apply(scene::SetForce{0, {free_nodes(one->model(0))[20]}, {0, 10, 5}});
       one->step(0.01);
     }
-    s.apply(CutObject{0, incision(s.model(0))});
+    s.apply(scene::CutObject{0, incision(s.model(0))});
     s.step(0.01);
-    s.apply(Restore{0});
+    s.apply(scene::Restore{0});
     EXPECT_EQ(s.model(0), never.model(0));
     s.step(30);
     never.step(30.01);
@@ -286,33 +288,33 @@ TEST(SimulationCut, RestoreMakesItWholeAgain) {
       largest = test::larger(largest, std::abs(value));
     for (std::size_t i = 0; i < a.size(); ++i)
       ASSERT_NEAR(a[i], b[i], 1e-6 * largest);
-    EXPECT_THROW(s.apply(Restore{0}), Error);
+    EXPECT_THROW(s.apply(scene::Restore{0}), Error);
   }
 }
 
 TEST(SimulationCut, BadCutsAreRefusedAndChangeNothing) {
-  SimulationOptions how;
+  scene::SimulationOptions how;
   how.guard = true;
-  for (const Method method : {Method::ffe, Method::ela}) {
-    Simulation s(one_thread(), how);
+  for (const scene::Method method : {scene::Method::ffe, scene::Method::ela}) {
+    scene::Simulation s(one_thread(), how);
     s.add_object("organ", organ(2), method);
-    s.apply(SetForce{0, {free_nodes(s.model(0))[3]}, {0, 1, 5}});
+    s.apply(scene::SetForce{0, {free_nodes(s.model(0))[3]}, {0, 1, 5}});
     s.step(0.01);
-    const Model before = s.model(0);
+    const model::Model before = s.model(0);
     const std::vector<double> u = shape(s, 0);
     std::uint32_t fixed = 0;
-    while (before.nodes[fixed].fixed == fixed_none)
+    while (before.nodes[fixed].fixed == model::fixed_none)
       ++fixed;
     std::vector<std::uint32_t> all(before.nodes.size());
     for (std::uint32_t i = 0; i < all.size(); ++i)
       all[i] = i;
-    const CutObject bad[]{
-        {0, PlaneToCut{{{0, 0, 500}, {0, 0, 1}}, {}}},
-        {0, PlaneToCut{{{100, -50, 30}, {0, 0, 1}}, std::vector<std::uint32_t>{fixed}}},
-        {0, SpringsToCut{{0}, {0}}},
-        {0, SpringsToCut{{fixed}, all}},
+    const scene::CutObject bad[]{
+        {0, scene::PlaneToCut{{{0, 0, 500}, {0, 0, 1}}, {}}},
+        {0, scene::PlaneToCut{{{100, -50, 30}, {0, 0, 1}}, std::vector<std::uint32_t>{fixed}}},
+        {0, scene::SpringsToCut{{0}, {0}}},
+        {0, scene::SpringsToCut{{fixed}, all}},
     };
-    for (const CutObject& cut : bad) {
+    for (const scene::CutObject& cut : bad) {
       try {
         s.apply(cut);
         ADD_FAILURE() << "no error";
@@ -324,32 +326,33 @@ TEST(SimulationCut, BadCutsAreRefusedAndChangeNothing) {
     }
     EXPECT_TRUE(s.news().cuttings.empty());
     EXPECT_EQ(shape(s, 0), u);
-    s.apply(CutObject{0, incision(s.model(0))});
-    EXPECT_THROW(s.apply(CutObject{0, incision(before)}), Error); // nothing is left
+    s.apply(scene::CutObject{0, incision(s.model(0))});
+    EXPECT_THROW(s.apply(scene::CutObject{0, incision(before)}), Error); // nothing is left
     EXPECT_EQ(s.news().cuttings.size(), 1U);
   }
 }
 
 TEST(SimulationCut, AStepThatFailsTakesACutBack) {
-  SimulationOptions how;
+  scene::SimulationOptions how;
   how.guard = true;
-  for (const Method method : {Method::ffe, Method::ela}) {
-    Simulation s(one_thread(), how), calm(one_thread(), how);
-    for (Simulation* one : {&s, &calm}) {
+  for (const scene::Method method : {scene::Method::ffe, scene::Method::ela}) {
+    scene::Simulation s(one_thread(), how), calm(one_thread(), how);
+    for (scene::Simulation* one : {&s, &calm}) {
       one->add_object("organ", soft_organ(), method);
-      one->add_object("other", organ(1), Method::ela);
-      one->apply(SetForce{0, {highest(one->model(0))}, {0, 10, 5}});
-      one->apply(SetGravity{{0, 0, -100}});
+      one->add_object("other", organ(1), scene::Method::ela);
+      one->apply(scene::SetForce{0, {highest(one->model(0))}, {0, 10, 5}});
+      one->apply(scene::SetGravity{{0, 0, -100}});
       one->step(0.01);
     }
-    const Model before = s.model(0);
+    const model::Model before = s.model(0);
     constexpr std::size_t probe = 0;
-    for (Simulation* one : {&s, &calm})
-      one->apply(SetInstrument{probe, {1, {}, 0}, {{100, -50, 90}, {}}});
-    s.apply(Grasp{0, {highest(before)}, probe});
-    calm.apply(Grasp{0, {highest(before)}, probe});
+    for (scene::Simulation* one : {&s, &calm})
+      one->apply(scene::SetInstrument{probe, {1, {}, 0}, {{100, -50, 90}, {}}});
+    s.apply(scene::Grasp{0, {highest(before)}, probe});
+    calm.apply(scene::Grasp{0, {highest(before)}, probe});
     s.schedule(0.015, lobe_off());
-    s.schedule(0.018, CutObject{1, PlaneToCut{{{0, 0, 500}, {0, 0, 1}}, {}}}); // misses
+    s.schedule(0.018,
+               scene::CutObject{1, scene::PlaneToCut{{{0, 0, 500}, {0, 0, 1}}, {}}}); // misses
     EXPECT_THROW(s.step(0.01), Error);
     EXPECT_EQ(s.object_count(), 2U);
     EXPECT_EQ(s.model(0), before);
@@ -366,54 +369,54 @@ TEST(SimulationCut, AStepThatFailsTakesACutBack) {
 }
 
 TEST(SimulationCut, ABladeCutsWhatItSweepsOver) {
-  for (const Method method : {Method::ffe, Method::ela})
+  for (const scene::Method method : {scene::Method::ffe, scene::Method::ela})
     for (const int steps : {1, 50}) {
-      Simulation s(one_thread(), {});
+      scene::Simulation s(one_thread(), {});
       s.add_object("organ", organ(4), method);
-      s.apply(SetForce{0, {highest(s.model(0))}, {0, 1, 5}});
+      s.apply(scene::SetForce{0, {highest(s.model(0))}, {0, 1, 5}});
       constexpr std::size_t blade = 0;
-      InstrumentShape edge;
+      contact::InstrumentShape edge;
       edge.radius = 0;
       edge.blade = true;
       edge.axis = {0, 0, -8};
-      s.apply(SetInstrument{blade, edge, {{88, -50.3, 53}, {}}});
+      s.apply(scene::SetInstrument{blade, edge, {{88, -50.3, 53}, {}}});
       s.step(0);
-      s.apply(MoveInstrument{blade, {112, -50.3, 53}, {}, 1});
+      s.apply(scene::MoveInstrument{blade, {112, -50.3, 53}, {}, 1});
       for (int k = 0; k < steps; ++k)
         s.step(1.0 / steps);
-      EXPECT_GE(count(s, Cutting::Kind::cut), 1U);
+      EXPECT_GE(count(s, scene::Cutting::Kind::cut), 1U);
       std::size_t doubled = 0;
-      for (const Cutting& c : s.news().cuttings)
+      for (const scene::Cutting& c : s.news().cuttings)
         doubled += c.doubled;
       EXPECT_GT(doubled, 8U) << steps;
       EXPECT_EQ(s.instrument(blade).nodes, 0U);
-      EXPECT_THROW(s.apply(Grasp{0, {free_nodes(s.model(0))[2]}, blade}), Error);
+      EXPECT_THROW(s.apply(scene::Grasp{0, {free_nodes(s.model(0))[2]}, blade}), Error);
     }
 }
 
 TEST(SimulationCut, StretchedTissueTears) {
-  for (const Method method : {Method::ffe, Method::ela}) {
-    Simulation s(one_thread(), {});
-    BuildOptions options;
+  for (const scene::Method method : {scene::Method::ffe, scene::Method::ela}) {
+    scene::Simulation s(one_thread(), {});
+    model::BuildOptions options;
     options.centrals = 0;
     options.bend = true;
-    Model model = build_model(test::sheet(8, 4), options, Context{}).model;
-    for (Node& n : model.nodes)
-      n.fixed = n.position.x < 0.5 ? fixed_all : fixed_z;
+    model::Model model = model::build_model(test::sheet(8, 4), options, Context{}).model;
+    for (model::Node& n : model.nodes)
+      n.fixed = n.position.x < 0.5 ? model::fixed_all : model::fixed_z;
     std::vector<std::uint32_t> right;
     for (std::uint32_t i = 0; i < model.nodes.size(); ++i)
       if (model.nodes[i].position.x > 7.5)
         right.push_back(i);
     s.add_object("sheet", model, method);
-    s.apply(SetTear{0, 0.3});
+    s.apply(scene::SetTear{0, 0.3});
     for (int k = 1; k <= 40; ++k) {
-      s.apply(SetDisplacement{0, right, {0.12 * k, 0, 0}});
+      s.apply(scene::SetDisplacement{0, right, {0.12 * k, 0, 0}});
       s.step(0.05);
       for (std::size_t object = 0; object < s.object_count(); ++object)
         for (const double u : shape(s, object))
           ASSERT_TRUE(std::isfinite(u));
     }
-    EXPECT_GT(count(s, Cutting::Kind::cut), 0U);
+    EXPECT_GT(count(s, scene::Cutting::Kind::cut), 0U);
   }
 }
 
@@ -422,11 +425,11 @@ TEST(SimulationCut, TheSameForAnyNumberOfThreads) {
   for (const int threads : {1, 2}) {
     Context context;
     context.threads = threads;
-    Simulation s(context, {});
-    s.add_object("organ", soft_organ(), Method::ffe);
-    s.apply(SetGravity{{0, 0, -9810}});
+    scene::Simulation s(context, {});
+    s.add_object("organ", soft_organ(), scene::Method::ffe);
+    s.apply(scene::SetGravity{{0, 0, -9810}});
     s.step(0.01);
-    s.apply(CutObject{0, incision(s.model(0))});
+    s.apply(scene::CutObject{0, incision(s.model(0))});
     s.step(0.01);
     s.apply(lobe_off());
     s.step(0.05);
@@ -441,12 +444,12 @@ TEST(SimulationCut, TheSameForAnyNumberOfThreads) {
 }
 
 TEST(SimulationCut, WhatIsTiedStaysTied) {
-  Simulation s(one_thread(), {});
-  s.add_object("organ", soft_organ(), Method::ela);
-  s.add_object("weight", test::two_masses(), Method::ela);
+  scene::Simulation s(one_thread(), {});
+  s.add_object("organ", soft_organ(), scene::Method::ela);
+  s.add_object("weight", test::two_masses(), scene::Method::ela);
   const std::uint32_t top = highest(s.model(0));
-  s.apply(Attach{0, {top}, 1, {0}, 1e4});
-  s.apply(SetGravity{{0, 0, -1000}});
+  s.apply(scene::Attach{0, {top}, 1, {0}, 1e4});
+  s.apply(scene::SetGravity{{0, 0, -1000}});
   s.step(0.01);
   s.apply(lobe_off());
   s.step(0.3);
@@ -455,18 +458,18 @@ TEST(SimulationCut, WhatIsTiedStaysTied) {
   const double lobe = shape(s, 2)[2], weight = shape(s, 1)[2];
   EXPECT_LT(lobe, -20);
   EXPECT_NEAR(lobe, weight, 10);
-  EXPECT_THROW(s.apply(SetMethod{1, Method::ffe}), Error);
+  EXPECT_THROW(s.apply(scene::SetMethod{1, scene::Method::ffe}), Error);
 }
 
 /// The copy that keeps the number of the node keeps its tie.
 TEST(SimulationCut, ATieFollowsTheMainCopyOfADoubledNode) {
-  const Model organ = soft_organ();
-  Simulation cut(one_thread(), {});
-  cut.add_object("organ", organ, Method::ela);
-  cut.apply(CutObject{0, incision(organ)});
+  const model::Model organ = soft_organ();
+  scene::Simulation cut(one_thread(), {});
+  cut.add_object("organ", organ, scene::Method::ela);
+  cut.apply(scene::CutObject{0, incision(organ)});
   ASSERT_EQ(cut.object_count(), 1U);
   const auto [mothers, places] = [&] {
-    const ObjectFacts facts = cut.object(0);
+    const scene::ObjectFacts facts = cut.object(0);
     return std::pair(std::vector<std::uint32_t>(facts.first_nodes.begin(), facts.first_nodes.end()),
                      std::vector<std::uint32_t>(facts.places.begin(), facts.places.end()));
   }();
@@ -477,15 +480,15 @@ TEST(SimulationCut, ATieFollowsTheMainCopyOfADoubledNode) {
       continue;
     ++doubled;
     for (const bool other : {false, true}) {
-      Simulation s(one_thread(), {});
-      s.add_object("organ", organ, Method::ela);
-      s.add_object("weight", test::two_masses(1), Method::ela);
+      scene::Simulation s(one_thread(), {});
+      s.add_object("organ", organ, scene::Method::ela);
+      s.add_object("weight", test::two_masses(1), scene::Method::ela);
       if (other)
-        s.apply(Attach{1, {0}, 0, {node}, 2000});
+        s.apply(scene::Attach{1, {0}, 0, {node}, 2000});
       else
-        s.apply(Attach{0, {node}, 1, {0}, 2000});
-      s.apply(CutObject{0, incision(organ)});
-      s.apply(SetForce{1, {0}, {0, 0, 3000}});
+        s.apply(scene::Attach{0, {node}, 1, {0}, 2000});
+      s.apply(scene::CutObject{0, incision(organ)});
+      s.apply(scene::SetForce{1, {0}, {0, 0, 3000}});
       s.step(0.03);
       const std::vector<double> u = shape(s, 0);
       EXPECT_GT(u[3 * std::size_t{main} + 2], 2 * std::abs(u[3 * std::size_t{copy} + 2])) << node;
@@ -498,22 +501,22 @@ TEST(SimulationCut, ATieFollowsTheMainCopyOfADoubledNode) {
 TEST(SimulationCut, AShapeThatNobodyAskedForIsThereWhenSomebodyDoes) {
   // Grasped between a cut and the next step, with the shape emitted before or not.
   const auto run = [](bool emitted) {
-    Simulation s(one_thread(), {});
-    s.add_object("organ", organ(3), Method::ffe);
+    scene::Simulation s(one_thread(), {});
+    s.add_object("organ", organ(3), scene::Method::ffe);
     const std::uint32_t top = highest(s.model(0));
-    s.apply(SetDisplacement{0, {top}, {0, 0, 0.5}});
+    s.apply(scene::SetDisplacement{0, {top}, {0, 0, 0.5}});
     if (emitted)
-      s.apply(Emit{.forces = false, .instruments = false});
+      s.apply(scene::Emit{.forces = false, .instruments = false});
     s.step(0.1);
-    s.apply(CutObject{0, incision(s.model(0))});
-    CutObject more{0, incision(s.model(0))};
-    std::get<PlaneToCut>(more.what).plane.point.x += 4;
+    s.apply(scene::CutObject{0, incision(s.model(0))});
+    scene::CutObject more{0, incision(s.model(0))};
+    std::get<scene::PlaneToCut>(more.what).plane.point.x += 4;
     s.apply(more); // two in a row
     constexpr std::size_t tool = 0;
-    InstrumentShape sphere;
+    contact::InstrumentShape sphere;
     sphere.radius = 1;
-    s.apply(SetInstrument{tool, sphere, {{200, 200, 200}, {}}});
-    s.apply(Grasp{0, {free_nodes(s.model(0))[20], free_nodes(s.model(0))[60]}, tool});
+    s.apply(scene::SetInstrument{tool, sphere, {{200, 200, 200}, {}}});
+    s.apply(scene::Grasp{0, {free_nodes(s.model(0))[20], free_nodes(s.model(0))[60]}, tool});
     s.step(0.1);
     return shape(s, 0);
   };
@@ -529,20 +532,20 @@ TEST(SimulationCut, AShapeThatNobodyAskedForIsThereWhenSomebodyDoes) {
 
 TEST(SimulationCut, ForcesDoNotDependOnShapesThatWereAskedFor) {
   const auto run = [](bool shapes) {
-    Simulation s(one_thread(), {});
-    s.add_object("organ", organ(3), Method::ffe);
+    scene::Simulation s(one_thread(), {});
+    s.add_object("organ", organ(3), scene::Method::ffe);
     const std::vector<std::uint32_t> nodes = free_nodes(s.model(0));
-    s.apply(SetDisplacement{0, {nodes[10], nodes[11], nodes[40]}, {0, 0.2, 0.5}});
+    s.apply(scene::SetDisplacement{0, {nodes[10], nodes[11], nodes[40]}, {0, 0.2, 0.5}});
     std::vector<double> all;
     for (int k = 0; k < 5; ++k) {
       if (k == 1)
-        s.apply(CutObject{0, incision(s.model(0))});
+        s.apply(scene::CutObject{0, incision(s.model(0))});
       if (k == 3)
-        s.apply(SetDisplacement{0, {nodes[10]}, {0.1, 0.2, 0.5}});
+        s.apply(scene::SetDisplacement{0, {nodes[10]}, {0.1, 0.2, 0.5}});
       s.step(0.1);
       if (shapes)
         (void)shape(s, 0);
-      for (const NodeVector& f : s.contact_forces(0))
+      for (const contact::NodeVector& f : s.contact_forces(0))
         all.insert(all.end(), {f.value.x, f.value.y, f.value.z});
     }
     return all;
@@ -554,14 +557,14 @@ TEST(SimulationCut, ForcesDoNotDependOnShapesThatWereAskedFor) {
 
 TEST(SimulationCut, APreparedFirstCutIsTheSameAndFactorisesNothingBefore) {
   const auto shape = [](bool prepared) {
-    Simulation s(test::one_thread(), {});
-    const Model model = test::organ(3);
-    s.add_object("organ", model, Method::ffe);
-    s.apply(SetForce{0, {test::highest(model)}, {0, 0, 2000}});
+    scene::Simulation s(test::one_thread(), {});
+    const model::Model model = test::organ(3);
+    s.add_object("organ", model, scene::Method::ffe);
+    s.apply(scene::SetForce{0, {test::highest(model)}, {0, 0, 2000}});
     s.step(0.001);
     if (prepared)
-      s.apply(Prepare{.object = 0, .contact = false, .cut = true, .nodes_ahead = {}});
-    s.apply(CutObject{0, test::incision(model)});
+      s.apply(scene::Prepare{.object = 0, .contact = false, .cut = true, .nodes_ahead = {}});
+    s.apply(scene::CutObject{0, test::incision(model)});
     s.step(0.001);
     EXPECT_EQ(s.counts().cuts, 1);
     EXPECT_EQ(s.counts().cut_unprepared, prepared ? 0 : 1);
@@ -571,4 +574,4 @@ TEST(SimulationCut, APreparedFirstCutIsTheSameAndFactorisesNothingBefore) {
 }
 
 } // namespace
-} // namespace gewebe
+} // namespace gewebe::test

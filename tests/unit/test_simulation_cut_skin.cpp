@@ -15,38 +15,38 @@
 #include <utility>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::test {
 namespace {
 
 using test::expect_skins_sound, test::models_of, test::notch, test::off, test::one_thread,
     test::skinned_bar;
 
-Vec3 middle_of(const Model& model, std::uint32_t element) {
+Vec3 middle_of(const model::Model& model, std::uint32_t element) {
   Vec3 middle;
   for (const std::uint32_t node : model.tetrahedra[element])
     middle += model.nodes[node].position / 4;
   return middle;
 }
 
-double skin_volume(const Model& model) {
-  return signed_volume(shown_mesh(model));
+double skin_volume(const model::Model& model) {
+  return signed_volume(model::shown_mesh(model));
 }
 
 class SkinCuts : public testing::TestWithParam<bool> {};
 INSTANTIATE_TEST_SUITE_P(Orders, SkinCuts, testing::Bool());
 
 TEST_P(SkinCuts, APieceTakesItsSkinWithIt) {
-  for (const Method method : {Method::ffe, Method::ela}) {
-    Simulation s(one_thread(), {});
-    const Model whole = skinned_bar(GetParam());
-    s.add_object("bar", Model(whole), method);
+  for (const scene::Method method : {scene::Method::ffe, scene::Method::ela}) {
+    scene::Simulation s(one_thread(), {});
+    const model::Model whole = skinned_bar(GetParam());
+    s.add_object("bar", model::Model(whole), method);
     for (const double x : {14.0, 9.7}) {
       s.apply(off(x));
       expect_skins_sound(models_of(s), skin_volume(whole));
     }
     ASSERT_EQ(s.object_count(), 3U);
     // The rim is in the plane, the wall has the material of the tissue there.
-    const Model held = s.model(0);
+    const model::Model held = s.model(0);
     std::size_t rim = 0;
     for (const Vec3& p : held.skin.points)
       rim += std::abs(dot(p - Vec3{9.7, 5, 5}, Vec3{1, 0.1, 0.2})) < 1e-9 ? 1 : 0;
@@ -59,12 +59,12 @@ TEST_P(SkinCuts, APieceTakesItsSkinWithIt) {
 }
 
 TEST_P(SkinCuts, PointsStayOnTheirSideOfANotch) {
-  Simulation s(one_thread(), {});
-  const Model whole = skinned_bar(GetParam());
-  s.add_object("bar", Model(whole), Method::ffe);
-  const CutObject what = notch(whole, 8.9);
+  scene::Simulation s(one_thread(), {});
+  const model::Model whole = skinned_bar(GetParam());
+  s.add_object("bar", model::Model(whole), scene::Method::ffe);
+  const scene::CutObject what = notch(whole, 8.9);
   s.apply(what);
-  const Model cut = s.model(0);
+  const model::Model cut = s.model(0);
   expect_skins_sound({&cut, 1}, skin_volume(whole));
   // Walls that look to +x are of what lies at -x; points of both are of the front.
   const Vec3 way = Vec3{1, 0.1, 0.05} / norm(Vec3{1, 0.1, 0.05});
@@ -95,22 +95,23 @@ TEST_P(SkinCuts, ABladeCutsInOneStepAndInMany) {
   for (const double low : {4.0, -3.0}) // down to here
     for (const int steps : {1, 7, 40}) {
       SCOPED_TRACE(steps);
-      Simulation s(one_thread(), {});
-      const Model whole = skinned_bar(GetParam());
-      s.add_object("bar", Model(whole), steps == 7 ? Method::ela : Method::ffe);
-      InstrumentShape edge;
+      scene::Simulation s(one_thread(), {});
+      const model::Model whole = skinned_bar(GetParam());
+      s.add_object("bar", model::Model(whole),
+                   steps == 7 ? scene::Method::ela : scene::Method::ffe);
+      contact::InstrumentShape edge;
       edge.radius = 0;
       edge.blade = true;
       edge.axis = {0, 0, 16};
-      s.apply(SetInstrument{0, edge, {{9.6, -4, low}, {}}, "knife"});
+      s.apply(scene::SetInstrument{0, edge, {{9.6, -4, low}, {}}, "knife"});
       s.step(0);
-      s.apply(MoveInstrument{0, {9.9, 14, low}, {}, 0.1});
+      s.apply(scene::MoveInstrument{0, {9.9, 14, low}, {}, 0.1});
       for (int k = 0; k < steps; ++k)
         s.step(0.1 / steps);
       EXPECT_EQ(s.object_count(), low > 0 ? 1U : 2U);
       expect_skins_sound(models_of(s), skin_volume(whole));
       // The rim runs where the blade did.
-      const Model cut = s.model(0);
+      const model::Model cut = s.model(0);
       double left = 20, right = 0;
       for (const Vec3& at : cut.skin.points)
         if (at.z > low && std::abs(at.x - (9.6 + 0.3 * (at.y + 4) / 18)) < 1e-6) {
@@ -123,49 +124,49 @@ TEST_P(SkinCuts, ABladeCutsInOneStepAndInMany) {
 }
 
 TEST(SkinCutScenes, ABladeCutsWhereTheSolidIs) {
-  Simulation s(one_thread(), {});
-  const Model whole = skinned_bar(false);
-  s.add_object("bar", Model(whole), Method::ffe);
-  s.apply(SetGravity{{0, 0, -30000}});
+  scene::Simulation s(one_thread(), {});
+  const model::Model whole = skinned_bar(false);
+  s.add_object("bar", model::Model(whole), scene::Method::ffe);
+  s.apply(scene::SetGravity{{0, 0, -30000}});
   s.step(0.1); // it hangs
-  InstrumentShape edge;
+  contact::InstrumentShape edge;
   edge.radius = 0;
   edge.blade = true;
   edge.axis = {0, 30, 0};
   const auto place = [](int k) { return Vec3{12.0 + 0.1 * k, -10, 14 - 0.8 * k}; };
-  s.apply(SetInstrument{0, edge, {place(0), {}}, "knife"});
+  s.apply(scene::SetInstrument{0, edge, {place(0), {}}, "knife"});
   for (int k = 1; k <= 20; ++k) {
-    s.apply(MoveInstrument{0, place(k), {}, 0});
+    s.apply(scene::MoveInstrument{0, place(k), {}, 0});
     s.step(0.01);
     expect_skins_sound(models_of(s), skin_volume(whole));
   }
 }
 
 TEST(SkinCutScenes, RestoreMakesItWholeAgain) {
-  Simulation s(one_thread(), {});
-  const Model whole = skinned_bar(true);
-  s.add_object("bar", Model(whole), Method::ffe);
+  scene::Simulation s(one_thread(), {});
+  const model::Model whole = skinned_bar(true);
+  s.add_object("bar", model::Model(whole), scene::Method::ffe);
   s.apply(notch(whole, 8.9));
   EXPECT_NE(s.model(0).skin, whole.skin);
-  s.apply(Restore{0});
+  s.apply(scene::Restore{0});
   EXPECT_EQ(s.model(0).skin, whole.skin);
 }
 
 TEST(SkinCutScenes, AlongFacesTheSkinIsCutByThePlane) {
-  Simulation s(one_thread(), {});
-  const Model whole = skinned_bar(false);
-  s.add_object("bar", Model(whole), Method::ffe);
-  s.apply(CutObject{0, PlaneToCut{{{9.7, 5, 5}, {1, 0.1, 0.2}}, {}, true}});
+  scene::Simulation s(one_thread(), {});
+  const model::Model whole = skinned_bar(false);
+  s.add_object("bar", model::Model(whole), scene::Method::ffe);
+  s.apply(scene::CutObject{0, scene::PlaneToCut{{{9.7, 5, 5}, {1, 0.1, 0.2}}, {}, true}});
   EXPECT_EQ(s.object_count(), 2U);
   expect_skins_sound(models_of(s), skin_volume(whole));
 }
 
 TEST(SkinCutScenes, ASkinThatIsOpenIsRefused) {
-  Simulation s(one_thread(), {});
-  Model model = skinned_bar(false);
+  scene::Simulation s(one_thread(), {});
+  model::Model model = skinned_bar(false);
   model.skin.triangles.resize(model.skin.triangles.size() / 2);
   model.skin.material.resize(model.skin.triangles.size());
-  s.add_object("bar", Model(model), Method::ffe);
+  s.add_object("bar", model::Model(model), scene::Method::ffe);
   try {
     s.apply(off(9.7));
     ADD_FAILURE();
@@ -178,20 +179,20 @@ TEST(SkinCutScenes, ASkinThatIsOpenIsRefused) {
 
 /// What elements have parted and no blade has.
 TEST(SkinParts, WhatIsNotCutIsTornAndClosed) {
-  Model model = skinned_bar(false);
-  const Skin skin = model.skin;
+  model::Model model = skinned_bar(false);
+  const model::Skin skin = model.skin;
   model.skin = {};
-  CutModel cut =
-      as_cut_model(model, cut_solid(model, plane_blade(model, {{9.7, 5, 5}, {1, 0.1, 0.2}})));
+  cutting::CutModel cut = cutting::as_cut_model(
+      model, cutting::cut_solid(model, cutting::plane_blade(model, {{9.7, 5, 5}, {1, 0.1, 0.2}})));
   cut.model.skin = skin;
-  FreeParts free = free_parts(model, cut);
+  cutting::FreeParts free = cutting::free_parts(model, cut);
   ASSERT_EQ(free.parts.size(), 1U);
-  const SkinPartsReport report = part_skin(cut.model, free);
+  const cutting::SkinPartsReport report = cutting::part_skin(cut.model, free);
   EXPECT_GT(report.torn, 50U);
-  const std::vector<Model> pieces{free.rest->model, free.parts[0].model};
+  const std::vector<model::Model> pieces{free.rest->model, free.parts[0].model};
   model.skin = skin;
   expect_skins_sound(pieces, skin_volume(model));
 }
 
 } // namespace
-} // namespace gewebe
+} // namespace gewebe::test

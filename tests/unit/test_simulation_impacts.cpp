@@ -16,36 +16,36 @@
 #include <cstdint>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::test {
 namespace {
 
 using namespace test;
 
 constexpr double step = 1.0 / 60, size = 2 * block_edge, gravity = 9810;
 
-double mass_of(const Simulation& s, std::size_t object) {
+double mass_of(const scene::Simulation& s, std::size_t object) {
   return weight_of(s, object) / gravity;
 }
 
 /// Of its middle.
-Vec3 place_of(const Simulation& s, std::size_t object) {
+Vec3 place_of(const scene::Simulation& s, std::size_t object) {
   Vec3 sum;
   const std::vector<double> u = shape(s, object);
   for (std::size_t i = 0; i < s.model(object).nodes.size(); ++i) {
-    const Node& n = s.model(object).nodes[i];
+    const model::Node& n = s.model(object).nodes[i];
     sum += n.mass * (n.position + vector_at(u, i));
   }
   return sum / mass_of(s, object);
 }
 
 /// Of both, times their mass.
-Vec3 centre_of(const Simulation& s) {
+Vec3 centre_of(const scene::Simulation& s) {
   return mass_of(s, 0) * place_of(s, 0) + mass_of(s, 1) * place_of(s, 1);
 }
 
 /// Of motion, elements and weight.
-double energy(const Simulation& s, double weight) {
-  const SimulationState state = s.state();
+double energy(const scene::Simulation& s, double weight) {
+  const scene::SimulationState state = s.state();
   double sum = state.kinetic_energy + state.elastic_energy;
   for (const std::size_t k : {0U, 1U})
     sum += weight * mass_of(s, k) * place_of(s, k).z;
@@ -53,8 +53,8 @@ double energy(const Simulation& s, double weight) {
 }
 
 /// How deep the node that is deepest in another object's elements is, over an edge.
-double depth_inside(const Simulation& s, std::size_t nodes, std::size_t elements) {
-  const Model& wall = s.model(elements);
+double depth_inside(const scene::Simulation& s, std::size_t nodes, std::size_t elements) {
+  const model::Model& wall = s.model(elements);
   const std::vector<double> u = shape(s, elements), own = shape(s, nodes);
   std::vector<Vec3> at;
   for (std::size_t i = 0; i < wall.nodes.size(); ++i)
@@ -68,9 +68,9 @@ double depth_inside(const Simulation& s, std::size_t nodes, std::size_t elements
         const Vec3 &a = at[t[(k + 1) % 4]], &b = at[t[(k + 2) % 4]], &c = at[t[(k + 3) % 4]];
         const Vec3 n = cross(b - a, c - a);
         const double side = dot(n, at[t[k]] - a) < 0 ? -1 : 1;
-        least = smaller(least, side * dot(n, p - a) / norm(n));
+        least = numeric::smaller(least, side * dot(n, p - a) / norm(n));
       }
-      most = larger(most, least);
+      most = numeric::larger(most, least);
     }
   }
   return most / block_edge;
@@ -78,21 +78,21 @@ double depth_inside(const Simulation& s, std::size_t nodes, std::size_t elements
 
 /// Two blocks, the second one above the first, that come together at so many of its sizes a step:
 /// first they are less than one step apart.
-void throw_block(Simulation& s, double sizes, double friction, bool held) {
+void throw_block(scene::Simulation& s, double sizes, double friction, bool held) {
   const double way = sizes * size;
-  Model below = block(6, 6, 1, {}, held),
-        above = block(2, 2, 2, {7.3, 8.1, block_edge + 0.3 + 1.4 * way});
-  for (Model* const m : {&below, &above})
-    for (Node& n : m->nodes)
+  model::Model below = block(6, 6, 1, {}, held),
+               above = block(2, 2, 2, {7.3, 8.1, block_edge + 0.3 + 1.4 * way});
+  for (model::Model* const m : {&below, &above})
+    for (model::Node& n : m->nodes)
       n.drag = 0;
   add(s, "below", below);
   add(s, "above", above);
-  s.apply(SetContact{0, 1, friction});
-  s.apply(SetTimestep{step});
+  s.apply(scene::SetContact{0, 1, friction});
+  s.apply(scene::SetTimestep{step});
   for (std::uint32_t i = 0; i < above.nodes.size(); ++i)
-    s.apply(SetForce{1, {i}, {0, 0, -way / step / step * above.nodes[i].mass}});
+    s.apply(scene::SetForce{1, {i}, {0, 0, -way / step / step * above.nodes[i].mass}});
   s.step(step);
-  s.apply(Release{1, nodes_of(above)});
+  s.apply(scene::Release{1, nodes_of(above)});
 }
 
 class Impacts : public testing::TestWithParam<double> {};
@@ -100,10 +100,10 @@ class Impacts : public testing::TestWithParam<double> {};
 TEST_P(Impacts, NoBlockGetsBeyondAWall) {
   const double sizes = GetParam();
   for (const bool held : {true, false}) {
-    Simulation s(one_thread(), {});
+    scene::Simulation s(one_thread(), {});
     throw_block(s, sizes, held ? 0.2 : 0, held);
     if (held)
-      s.apply(SetGravity{{0, 0, -gravity}});
+      s.apply(scene::SetGravity{{0, 0, -gravity}});
     const double weight = held ? gravity : 0;
     const double thrown = mass_of(s, 1) * std::pow(sizes * size / step, 2) / 2;
     double least = energy(s, weight), pushed = 0;
@@ -112,13 +112,13 @@ TEST_P(Impacts, NoBlockGetsBeyondAWall) {
     for (int k = 0; k < 8; ++k) {
       s.step(step);
       const Vec3 force = sum_of_forces(s, 1);
-      pushed = larger(pushed, norm(force));
+      pushed = numeric::larger(pushed, norm(force));
       EXPECT_LE(norm(force + sum_of_forces(s, 0)), 1e-12 * pushed) << k;
       // Forces are right to 1e-4 of an edge, and act on in parts of a step.
       const double now = energy(s, weight);
       EXPECT_LE(now, least + 1e-3 * thrown + 2e-4 * block_edge * norm(force)) << k;
-      least = smaller(least, now);
-      EXPECT_LE(larger(depth_inside(s, 1, 0), depth_inside(s, 0, 1)), 1e-3) << k;
+      least = numeric::smaller(least, now);
+      EXPECT_LE(numeric::larger(depth_inside(s, 1, 0), depth_inside(s, 0, 1)), 1e-3) << k;
       const Vec3 going = way[2];
       const std::array<Vec3, 3> there{place_of(s, 0), place_of(s, 1), centre_of(s)};
       for (std::size_t i = 0; i < 3; ++i)
@@ -140,35 +140,35 @@ TEST_P(Impacts, NoBlockGetsBeyondAWall) {
 /// told so when the step began.
 TEST(SimulationImpacts, WhatIsPulledFromRestIsStoppedToo) {
   for (const double sizes : {0.5, 3.0, 10.0}) {
-    Simulation s(one_thread(), {});
+    scene::Simulation s(one_thread(), {});
     const double way = sizes * size;
     add(s, "below", block(6, 6, 1, {}, true));
-    const Model above = block(2, 2, 2, {7.3, 8.1, block_edge + 0.3 + 0.5 * way});
+    const model::Model above = block(2, 2, 2, {7.3, 8.1, block_edge + 0.3 + 0.5 * way});
     add(s, "above", above);
-    s.apply(SetContact{0, 1, 0.2});
-    s.apply(SetTimestep{step});
+    s.apply(scene::SetContact{0, 1, 0.2});
+    s.apply(scene::SetTimestep{step});
     for (std::uint32_t i = 0; i < above.nodes.size(); ++i)
-      s.apply(SetForce{1, {i}, {0, 0, -way / step / step * above.nodes[i].mass}});
+      s.apply(scene::SetForce{1, {i}, {0, 0, -way / step / step * above.nodes[i].mass}});
     s.step(step);
     EXPECT_GT(place_of(s, 1).z, place_of(s, 0).z);
-    EXPECT_LE(larger(depth_inside(s, 1, 0), depth_inside(s, 0, 1)), 1e-3);
+    EXPECT_LE(numeric::larger(depth_inside(s, 1, 0), depth_inside(s, 0, 1)), 1e-3);
   }
 }
 
 /// An instrument that is moved at once pushes two blocks out of its way: they leave no speed behind
 /// but what their shapes give back.
 TEST(SimulationImpacts, WhatIsInTheWayOfAnInstrumentMovedAtOnceGoesOn) {
-  Simulation s(one_thread(), {});
+  scene::Simulation s(one_thread(), {});
   add(s, "one", block(2, 1, 1, {}));
   add(s, "other", block(2, 1, 1, {0, 4.05, 0}));
-  s.apply(SetContact{0, 1, 0});
-  SetInstrument ball;
+  s.apply(scene::SetContact{0, 1, 0});
+  scene::SetInstrument ball;
   ball.shape.radius = 4;
   ball.pose.place = {4, 4, -5};
   s.apply(ball);
   s.step(1e-4);
   constexpr double way = 14;
-  s.apply(MoveInstrument{0, {4, 4, -5 + way}, {}, 0});
+  s.apply(scene::MoveInstrument{0, {4, 4, -5 + way}, {}, 0});
   s.step(1e-4);
   EXPECT_GT(least_gap(s, 0, 1), 0);
   for (const std::size_t k : {0U, 1U}) {
@@ -182,4 +182,4 @@ TEST(SimulationImpacts, WhatIsInTheWayOfAnInstrumentMovedAtOnceGoesOn) {
 INSTANTIATE_TEST_SUITE_P(SizesAStep, Impacts, testing::Values(0.1, 0.5, 1, 2, 5, 10));
 
 } // namespace
-} // namespace gewebe
+} // namespace gewebe::test

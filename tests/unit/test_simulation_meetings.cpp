@@ -22,7 +22,7 @@
 #include <string>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::test {
 namespace {
 
 using namespace test;
@@ -31,12 +31,12 @@ constexpr double edge = block_edge;
 
 TEST(SimulationMeetings, ABlockRestsOnAnother) {
   for (const double friction : {0.0, 0.3}) {
-    Simulation s(one_thread(), {});
+    scene::Simulation s(one_thread(), {});
     add(s, "below", block(5, 5, 2, {}, true));
     add(s, "above", block(3, 3, 2, {3.7, 4.1, 8.3}));
-    s.apply(SetGravity{{0, 0, -9810}});
-    s.apply(SetTimestep{1.0 / 600});
-    s.apply(SetContact{0, 1, friction});
+    s.apply(scene::SetGravity{{0, 0, -9810}});
+    s.apply(scene::SetTimestep{1.0 / 600});
+    s.apply(scene::SetContact{0, 1, friction});
     for (int k = 0; k < 16; ++k) {
       s.step(1.0 / 60);
       EXPECT_GT(least_gap(s, 0, 1), 0);
@@ -53,7 +53,7 @@ TEST(SimulationMeetings, ABlockRestsOnAnother) {
 }
 
 /// Of its step, in g mm/s.
-Vec3 momentum(Simulation& s, double h) {
+Vec3 momentum(scene::Simulation& s, double h) {
   std::vector<std::vector<double>> before;
   for (std::size_t i = 0; i < s.object_count(); ++i)
     before.push_back(test::shape(s, i));
@@ -73,12 +73,12 @@ TEST(SimulationMeetings, ColumnsOfComplianceStayWithinTheMemory) {
   const auto shape_after = [](std::uint64_t memory) {
     Context context = one_thread();
     context.max_memory = memory;
-    Simulation s(context, {});
+    scene::Simulation s(context, {});
     add(s, "below", block(5, 5, 2, {}, true));
     add(s, "above", block(3, 3, 2, {3.7, 4.1, 8.02}));
-    s.apply(SetGravity{{3000, 0, -9810}});
-    s.apply(SetTimestep{1.0 / 200});
-    s.apply(SetContact{0, 1, 0.1});
+    s.apply(scene::SetGravity{{3000, 0, -9810}});
+    s.apply(scene::SetTimestep{1.0 / 200});
+    s.apply(scene::SetContact{0, 1, 0.1});
     for (int k = 0; k < 12; ++k)
       s.step(1.0 / 200);
     return test::shape(s, 1);
@@ -90,17 +90,17 @@ TEST(SimulationMeetings, ColumnsOfComplianceStayWithinTheMemory) {
 /// Contact forces are those that a body moves by, in each step, at large steps too: mass times
 /// acceleration less weight.
 TEST(SimulationMeetings, ABlockSlidesByTheForcesThatAreShown) {
-  Simulation s(one_thread(), {});
+  scene::Simulation s(one_thread(), {});
   add(s, "slope", block(9, 5, 2, {}, true));
-  Model above = block(3, 3, 2, {3.7, 4.1, 8.01});
-  for (Node& n : above.nodes)
+  model::Model above = block(3, 3, 2, {3.7, 4.1, 8.01});
+  for (model::Node& n : above.nodes)
     n.drag = 0;
   add(s, "block", above);
   const double h = 1.0 / 60, weight = weight_of(s, 1), mass = weight / 9810;
   const Vec3 gravity{9810 * std::sin(0.17), 0, -9810 * std::cos(0.17)};
-  s.apply(SetGravity{gravity});
-  s.apply(SetTimestep{h});
-  s.apply(SetContact{0, 1, 0});
+  s.apply(scene::SetGravity{gravity});
+  s.apply(scene::SetTimestep{h});
+  s.apply(scene::SetContact{0, 1, 0});
   std::vector<Vec3> at;
   const auto centre = [&] {
     Vec3 sum;
@@ -121,20 +121,20 @@ TEST(SimulationMeetings, ABlockSlidesByTheForcesThatAreShown) {
 }
 
 TEST(SimulationMeetings, BodiesThatCollideKeepTheirMomentum) {
-  Simulation s(one_thread(), {});
-  Model fast = block(2, 2, 2, {}), slow = block(3, 2, 2, {14, 1.5, 2.5});
-  for (Model* const m : {&fast, &slow})
-    for (Node& n : m->nodes)
+  scene::Simulation s(one_thread(), {});
+  model::Model fast = block(2, 2, 2, {}), slow = block(3, 2, 2, {14, 1.5, 2.5});
+  for (model::Model* const m : {&fast, &slow})
+    for (model::Node& n : m->nodes)
       n.drag = 0;
   add(s, "fast", fast);
   add(s, "slow", slow);
   const double h = 1e-3;
-  s.apply(SetTimestep{h});
-  s.apply(SetContact{0, 1, 0.2});
-  s.apply(SetForce{0, nodes_of(fast), {500, 20, 0}});
+  s.apply(scene::SetTimestep{h});
+  s.apply(scene::SetContact{0, 1, 0.2});
+  s.apply(scene::SetForce{0, nodes_of(fast), {500, 20, 0}});
   for (int k = 0; k < 20; ++k)
     s.step(h);
-  s.apply(Release{0, nodes_of(fast)});
+  s.apply(scene::Release{0, nodes_of(fast)});
   s.step(h);
   const Vec3 before = momentum(s, h);
   double pushed = 0, least = HUGE_VAL;
@@ -150,26 +150,26 @@ TEST(SimulationMeetings, BodiesThatCollideKeepTheirMomentum) {
 }
 
 /// A ball of 10 mm radius on tetrahedra that meet in its middle.
-Model solid_ball(const Vec3& center) {
+model::Model solid_ball(const Vec3& center) {
   const TriangleMesh surface = test::ball(2, 10, center);
-  TetMesh mesh;
+  tetrahedra::TetMesh mesh;
   mesh.points = surface.points;
   mesh.points.push_back(center);
   const auto middle = static_cast<std::uint32_t>(surface.points.size());
   for (const Triangle& t : surface.triangles)
     mesh.tetrahedra.push_back({t[1], t[0], t[2], middle});
-  SolidModelOptions options;
+  fem::SolidModelOptions options;
   options.material.materials = {{"gel", 1e-3, 2e4, 1, 0.2, 0.4}};
   options.quadratic = false;
-  return solid_model(mesh, options, {});
+  return fem::solid_model(mesh, options, {});
 }
 
 TEST(SimulationMeetings, ABallFallsOnAHeldPlate) {
-  Simulation s(one_thread(), {});
+  scene::Simulation s(one_thread(), {});
   add(s, "plate", block(6, 6, 1, {}, true));
   add(s, "ball", solid_ball({11.3, 12.1, 15}));
-  s.apply(SetGravity{{0, 0, -9810}});
-  s.apply(SetContact{1, 0, 0.5});
+  s.apply(scene::SetGravity{{0, 0, -9810}});
+  s.apply(scene::SetContact{1, 0, 0.5});
   double least = HUGE_VAL, hardest = 0, mean = 0;
   for (int k = 0; k < 30; ++k) {
     s.step(1.0 / 60);
@@ -185,8 +185,8 @@ TEST(SimulationMeetings, ABallFallsOnAHeldPlate) {
 }
 
 /// Two arms along x, one element apart, held at their lower side.
-Model clamp() {
-  TetMesh mesh = test::box_tetrahedra(8, 2, 5, edge);
+model::Model clamp() {
+  tetrahedra::TetMesh mesh = test::box_tetrahedra(8, 2, 5, edge);
   std::vector<Tetrahedron> kept;
   for (const Tetrahedron& t : mesh.tetrahedra) {
     Vec3 middle;
@@ -199,7 +199,7 @@ Model clamp() {
   for (const Tetrahedron& t : kept)
     for (const std::uint32_t i : t)
       number[i] = 1;
-  TetMesh some;
+  tetrahedra::TetMesh some;
   for (std::size_t i = 0; i < number.size(); ++i)
     if (number[i] != 0) {
       number[i] = static_cast<std::uint32_t>(some.points.size());
@@ -210,17 +210,17 @@ Model clamp() {
       i = number[i];
     some.tetrahedra.push_back(t);
   }
-  SolidModelOptions options;
+  fem::SolidModelOptions options;
   options.material.materials = {{"gel", 1e-3, 2e4, 1, 0.2, 0.4}};
   options.quadratic = false;
-  Model model = solid_model(some, options, {});
-  for (Node& node : model.nodes)
+  model::Model model = fem::solid_model(some, options, {});
+  for (model::Node& node : model.nodes)
     if (node.position.z == 0)
-      node.fixed = fixed_all;
+      node.fixed = model::fixed_all;
   return model;
 }
 
-std::vector<std::uint32_t> tip_of(const Model& model) {
+std::vector<std::uint32_t> tip_of(const model::Model& model) {
   std::vector<std::uint32_t> tip;
   for (std::uint32_t i = 0; i < model.nodes.size(); ++i)
     if (model.nodes[i].position.x == 8 * edge && model.nodes[i].position.z == 5 * edge)
@@ -230,12 +230,12 @@ std::vector<std::uint32_t> tip_of(const Model& model) {
 
 TEST(SimulationMeetings, TheArmsOfAClampTouch) {
   for (const bool meets : {true, false}) {
-    Simulation s(one_thread(), {});
-    const Model model = clamp();
+    scene::Simulation s(one_thread(), {});
+    const model::Model model = clamp();
     add(s, "clamp", model);
     if (meets)
-      s.apply(SetContact{0, 0, 0.3});
-    s.apply(SetForce{0, tip_of(model), {0, 0, -4e3}});
+      s.apply(scene::SetContact{0, 0, 0.3});
+    s.apply(scene::SetForce{0, tip_of(model), {0, 0, -4e3}});
     double least = HUGE_VAL;
     for (int k = 0; k < 20; ++k) {
       s.step(1.0 / 60);
@@ -254,23 +254,23 @@ TEST(SimulationMeetings, TheArmsOfAClampTouch) {
 
 TEST(SimulationMeetings, AnInstrumentPressesOneObjectOntoAnother) {
   for (const double friction : {0.0, 0.4}) {
-    Simulation s(one_thread(), {});
+    scene::Simulation s(one_thread(), {});
     add(s, "below", block(4, 4, 1, {}, true));
     add(s, "above", block(2, 2, 1, {3.7, 4.1, 4.1}));
-    s.apply(SetTimestep{1.0 / 600});
-    s.apply(SetContact{0, 1, 0.3});
-    SetInstrument ball;
+    s.apply(scene::SetTimestep{1.0 / 600});
+    s.apply(scene::SetContact{0, 1, 0.3});
+    scene::SetInstrument ball;
     ball.name = "probe";
     ball.shape.radius = 6;
     ball.shape.friction = friction;
     ball.pose.place = {7.7, 8.1, 14.3};
     s.apply(ball);
-    s.apply(MoveInstrument{0, {7.7, 8.1, 13.1}, {}, 0.1});
+    s.apply(scene::MoveInstrument{0, {7.7, 8.1, 13.1}, {}, 0.1});
     for (int k = 0; k < 12; ++k) {
       s.step(1.0 / 60);
       EXPECT_GT(least_gap(s, 0, 1), 0);
       double depth = 0;
-      const PlacedInstrument probe(s.instrument(0).shape, s.instrument(0).pose);
+      const contact::PlacedInstrument probe(s.instrument(0).shape, s.instrument(0).pose);
       const std::vector<double> u = test::shape(s, 1);
       for (std::size_t i = 0; i < s.model(1).nodes.size(); ++i)
         depth =
@@ -286,12 +286,12 @@ TEST(SimulationMeetings, AnInstrumentPressesOneObjectOntoAnother) {
 
 TEST(SimulationMeetings, WhatIsFarApartMovesAlone) {
   const auto rounds = [](bool meets, double away) {
-    Simulation s(one_thread(), {});
+    scene::Simulation s(one_thread(), {});
     add(s, "below", block(5, 5, 2, {}, true));
     add(s, "above", block(3, 3, 2, {3.7, 4.1, 8.3 + away}));
-    s.apply(SetGravity{{0, 0, -9810}});
+    s.apply(scene::SetGravity{{0, 0, -9810}});
     if (meets)
-      s.apply(SetContact{0, 1, 0.2});
+      s.apply(scene::SetContact{0, 1, 0.2});
     for (int k = 0; k < 5; ++k)
       s.step(1.0 / 60);
     EXPECT_EQ(s.counts().contact.steps > 0, meets && away == 0);
@@ -304,17 +304,17 @@ TEST(SimulationMeetings, WhatIsFarApartMovesAlone) {
 /// A step that fails leaves all as it was, though bodies were joined in it.
 TEST(SimulationMeetings, AStepThatFailsIsTakenBack) {
   const auto run = [](bool fail) {
-    Simulation s(one_thread(), {.guard = true});
+    scene::Simulation s(one_thread(), {.guard = true});
     add(s, "below", block(4, 4, 1, {}, true));
     add(s, "above", block(2, 2, 1, {3.7, 4.1, 12}));
     add(s, "apart", block(1, 1, 1, {300, 0, 0}, true));
-    s.apply(SetGravity{{0, 0, -9810}});
-    s.apply(SetContact{0, 1, 0.2});
+    s.apply(scene::SetGravity{{0, 0, -9810}});
+    s.apply(scene::SetContact{0, 1, 0.2});
     for (int k = 0; k < 6; ++k) {
       if (fail) {
-        s.apply(SetForce{2, {7}, {1e45, 0, 0}});
+        s.apply(scene::SetForce{2, {7}, {1e45, 0, 0}});
         EXPECT_THROW(s.step(1.0 / 60), Error);
-        s.apply(Release{2, {7}});
+        s.apply(scene::Release{2, {7}});
       }
       s.step(1.0 / 60);
     }
@@ -329,15 +329,15 @@ TEST(SimulationMeetings, AStepThatFailsIsTakenBack) {
 }
 
 TEST(SimulationMeetings, WhatIsCutOffTouchesStill) {
-  Simulation s(one_thread(), {});
-  Model organ = test::soft_organ();
-  for (Node& n : organ.nodes)
+  scene::Simulation s(one_thread(), {});
+  model::Model organ = test::soft_organ();
+  for (model::Node& n : organ.nodes)
     n.drag = n.mass;
   add(s, "organ", organ);
   add(s, "plate", block(3, 3, 1, {94, -56, 50.1}));
-  s.apply(SetContact{0, 1, 0});
-  s.apply(SetContact{0, 0, 0});
-  s.apply(SetGravity{{0, 0, -9810}});
+  s.apply(scene::SetContact{0, 1, 0});
+  s.apply(scene::SetContact{0, 0, 0});
+  s.apply(scene::SetGravity{{0, 0, -9810}});
   s.step(1.0 / 60);
   s.apply(test::lobe_off());
   ASSERT_EQ(s.object_count(), 3U);
@@ -352,4 +352,4 @@ TEST(SimulationMeetings, WhatIsCutOffTouchesStill) {
 }
 
 } // namespace
-} // namespace gewebe
+} // namespace gewebe::test

@@ -12,7 +12,7 @@
 #include <variant>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::test {
 namespace {
 
 using test::free_nodes, test::highest, test::lobe_off, test::one_thread, test::shape,
@@ -21,9 +21,9 @@ using test::free_nodes, test::highest, test::lobe_off, test::one_thread, test::s
 constexpr double dt = 0.1;
 
 /// Nothing but springs acts on it.
-Model undragged() {
-  Model model = soft_organ();
-  for (Node& n : model.nodes)
+model::Model undragged() {
+  model::Model model = soft_organ();
+  for (model::Node& n : model.nodes)
     n.drag = 0;
   return model;
 }
@@ -33,7 +33,7 @@ Vec3 at(const std::vector<double>& values, std::size_t node) {
 }
 
 /// The node of a model at each place.
-std::map<std::array<double, 3>, std::uint32_t> by_place(const Model& model) {
+std::map<std::array<double, 3>, std::uint32_t> by_place(const model::Model& model) {
   std::map<std::array<double, 3>, std::uint32_t> nodes;
   for (std::uint32_t i = 0; i < model.nodes.size(); ++i) {
     const Vec3& p = model.nodes[i].position;
@@ -43,16 +43,17 @@ std::map<std::array<double, 3>, std::uint32_t> by_place(const Model& model) {
 }
 
 /// Mass times velocity of an object, were its nodes as fast as those of `whole` (mm/s, 3 n).
-Vec3 momentum(const Model& part, const Model& whole, const std::vector<double>& velocity) {
+Vec3 momentum(const model::Model& part, const model::Model& whole,
+              const std::vector<double>& velocity) {
   const auto nodes = by_place(whole);
   Vec3 sum;
-  for (const Node& n : part.nodes)
+  for (const model::Node& n : part.nodes)
     sum += n.mass * at(velocity, nodes.at({n.position.x, n.position.y, n.position.z}));
   return sum;
 }
 
 /// That which an object has on which nothing acts, from the way that it takes in a short time.
-Vec3 momentum(Simulation& s, std::size_t object, double time = 0.01) {
+Vec3 momentum(scene::Simulation& s, std::size_t object, double time = 0.01) {
   const auto moment = [&] {
     Vec3 sum;
     const std::vector<double> u = shape(s, object);
@@ -66,8 +67,8 @@ Vec3 momentum(Simulation& s, std::size_t object, double time = 0.01) {
   return (moment() - before) / time;
 }
 
-std::vector<double> shape_under(const Model& model, const Load& load) {
-  Elastostatic solver(model, {}, one_thread());
+std::vector<double> shape_under(const model::Model& model, const contact::Load& load) {
+  statics::Elastostatic solver(model, {}, one_thread());
   solver.update(load);
   return {solver.displacement().begin(), solver.displacement().end()};
 }
@@ -80,7 +81,7 @@ std::vector<double> rate(const std::vector<double>& now, const std::vector<doubl
 }
 
 /// Nodes of the lobe, away from the incision.
-std::vector<std::uint32_t> pulled_nodes(const Model& model) {
+std::vector<std::uint32_t> pulled_nodes(const model::Model& model) {
   std::vector<std::uint32_t> nodes;
   for (const std::uint32_t i : free_nodes(model))
     if (model.nodes[i].position.z > 44 && model.nodes[i].position.x > 104)
@@ -91,14 +92,14 @@ std::vector<std::uint32_t> pulled_nodes(const Model& model) {
 const Vec3 pull{3, 1, 7};
 
 /// Pulled k times as hard for a step.
-void pull_for_a_step(Simulation& s, const std::vector<std::uint32_t>& nodes, double k) {
-  s.apply(SetForce{0, nodes, k * pull});
+void pull_for_a_step(scene::Simulation& s, const std::vector<std::uint32_t>& nodes, double k) {
+  s.apply(scene::SetForce{0, nodes, k * pull});
   s.step(dt);
 }
 
-void let_go_and_cut(Simulation& s, const std::vector<std::uint32_t>& nodes) {
-  s.apply(SetGravity{{}});
-  s.apply(Release{0, nodes});
+void let_go_and_cut(scene::Simulation& s, const std::vector<std::uint32_t>& nodes) {
+  s.apply(scene::SetGravity{{}});
+  s.apply(scene::Release{0, nodes});
   s.apply(lobe_off());
 }
 
@@ -107,25 +108,25 @@ void expect_same(const Vec3& is, const Vec3& should, double tolerance) {
 }
 
 TEST(SimulationMomentum, APartIsAsFastAsItsLoadGrew) {
-  const Model model = undragged();
+  const model::Model model = undragged();
   const std::vector<std::uint32_t> nodes = pulled_nodes(model);
   ASSERT_GT(nodes.size(), 2U);
-  Load load{};
+  contact::Load load{};
   for (const std::uint32_t i : nodes)
     load.force[i] = pull;
   const std::vector<double> each = shape_under(model, load);
   const std::vector<double> rest(each.size());
   for (const bool in_a_step : {false, true})
     for (const bool looked_at : {false, true}) {
-      SimulationOptions how;
+      scene::SimulationOptions how;
       how.shapes = looked_at;
       how.guard = looked_at;
-      Simulation s(one_thread(), how);
-      s.add_object("organ", model, Method::ffe);
+      scene::Simulation s(one_thread(), how);
+      s.add_object("organ", model, scene::Method::ffe);
       for (const double k : {1., 2., 3.})
         pull_for_a_step(s, nodes, k);
       if (in_a_step) {
-        s.schedule(s.time() + dt / 2, Release{0, nodes});
+        s.schedule(s.time() + dt / 2, scene::Release{0, nodes});
         s.schedule(s.time() + dt / 2, lobe_off());
         s.step(dt);
       } else {
@@ -140,8 +141,8 @@ TEST(SimulationMomentum, APartIsAsFastAsItsLoadGrew) {
 
 TEST(SimulationMomentum, WhatStandsStillHasNone) {
   for (const bool first : {true, false}) { // its first step is no motion
-    Simulation s(one_thread(), {});
-    s.add_object("organ", undragged(), Method::ffe);
+    scene::Simulation s(one_thread(), {});
+    s.add_object("organ", undragged(), scene::Method::ffe);
     const std::vector<std::uint32_t> nodes = pulled_nodes(s.model(0));
     pull_for_a_step(s, nodes, 1);
     if (!first) {
@@ -155,16 +156,16 @@ TEST(SimulationMomentum, WhatStandsStillHasNone) {
 }
 
 TEST(SimulationMomentum, AStepWithoutTimeTakesThePlaceOfTheOneBefore) {
-  const Model model = undragged();
+  const model::Model model = undragged();
   const std::vector<std::uint32_t> nodes = pulled_nodes(model);
-  Load load{};
+  contact::Load load{};
   for (const std::uint32_t i : nodes)
     load.force[i] = 1.5 * pull;
-  Simulation s(one_thread(), {});
-  s.add_object("organ", model, Method::ffe);
+  scene::Simulation s(one_thread(), {});
+  s.add_object("organ", model, scene::Method::ffe);
   for (const double k : {1., 2.})
     pull_for_a_step(s, nodes, k);
-  s.apply(SetForce{0, nodes, 2.5 * pull});
+  s.apply(scene::SetForce{0, nodes, 2.5 * pull});
   s.step(0);
   let_go_and_cut(s, nodes);
   ASSERT_EQ(s.object_count(), 2U);
@@ -174,27 +175,27 @@ TEST(SimulationMomentum, AStepWithoutTimeTakesThePlaceOfTheOneBefore) {
 }
 
 TEST(SimulationMomentum, AWoundThatHasJustOpenedIsNoMotion) {
-  Simulation s(one_thread(), {});
-  s.add_object("organ", undragged(), Method::ffe);
+  scene::Simulation s(one_thread(), {});
+  s.add_object("organ", undragged(), scene::Method::ffe);
   const std::vector<std::uint32_t> nodes = pulled_nodes(s.model(0));
-  s.apply(SetGravity{{0, -9810, 0}});
+  s.apply(scene::SetGravity{{0, -9810, 0}});
   for (const double k : {1., 2.})
     pull_for_a_step(s, nodes, k);
   const std::vector<double> before = shape(s, 0);
-  SpringsToCut inside; // of one side, so that no node is doubled
+  scene::SpringsToCut inside; // of one side, so that no node is doubled
   for (std::uint32_t i = 0; i < s.model(0).nodes.size(); ++i)
-    if (i >= surface_count(s.model(0)))
+    if (i >= model::surface_count(s.model(0)))
       inside.to.push_back(i);
     else if (s.model(0).nodes[i].position.y < -50)
       inside.from.push_back(i);
-  s.apply(CutObject{0, inside});
+  s.apply(scene::CutObject{0, inside});
   EXPECT_GT(s.news().cuttings[0].springs, 10U);
   EXPECT_EQ(s.news().cuttings[0].doubled, 0U);
   pull_for_a_step(s, nodes, 3);
   ASSERT_EQ(s.object_count(), 1U);
-  const Model opened = s.model(0);
+  const model::Model opened = s.model(0);
   const std::vector<double> shown = shape(s, 0);
-  Load load{};
+  contact::Load load{};
   for (const std::uint32_t i : nodes)
     load.force[i] = pull;
   const std::vector<double> grown = shape_under(opened, load);
@@ -208,19 +209,19 @@ TEST(SimulationMomentum, AWoundThatHasJustOpenedIsNoMotion) {
 }
 
 TEST(SimulationMomentum, WhatAnInstrumentPushesMovesWithIt) {
-  const Model model = undragged();
-  Simulation s(one_thread(), {});
-  s.add_object("organ", model, Method::ffe);
+  const model::Model model = undragged();
+  scene::Simulation s(one_thread(), {});
+  s.add_object("organ", model, scene::Method::ffe);
   constexpr std::size_t tool = 0;
-  s.apply(SetInstrument{tool, {8, {}, 0}, {{100.3, -49.8, 59}, {}}});
-  s.apply(MoveInstrument{tool, {101, -49.5, 55}, {}, 4 * dt});
+  s.apply(scene::SetInstrument{tool, {8, {}, 0}, {{100.3, -49.8, 59}, {}}});
+  s.apply(scene::MoveInstrument{tool, {101, -49.5, 55}, {}, 4 * dt});
   s.step(dt);
   s.step(dt);
   const std::vector<double> before = shape(s, 0);
   s.step(dt);
   const std::vector<double> now = shape(s, 0);
   EXPECT_GT(s.instrument(tool).nodes, 0U);
-  s.apply(Withdraw{tool});
+  s.apply(scene::Withdraw{tool});
   s.apply(lobe_off());
   ASSERT_EQ(s.object_count(), 2U);
   const Vec3 should = momentum(s.model(1), model, rate(now, before));
@@ -230,30 +231,30 @@ TEST(SimulationMomentum, WhatAnInstrumentPushesMovesWithIt) {
 
 TEST(SimulationMomentum, AStepThatFailsAndIsRepeatedGivesTheSame) {
   bool fail = true;
-  SimulationOptions how, calm_how;
+  scene::SimulationOptions how, calm_how;
   how.guard = calm_how.guard = true;
-  how.applied = [&](const Change& change) {
-    if (fail && std::holds_alternative<CutObject>(change))
+  how.applied = [&](const scene::Change& change) {
+    if (fail && std::holds_alternative<scene::CutObject>(change))
       throw Error("not now");
   };
-  Simulation s(one_thread(), how), calm(one_thread(), calm_how);
-  for (Simulation* one : {&s, &calm}) {
-    one->add_object("organ", undragged(), Method::ffe);
+  scene::Simulation s(one_thread(), how), calm(one_thread(), calm_how);
+  for (scene::Simulation* one : {&s, &calm}) {
+    one->add_object("organ", undragged(), scene::Method::ffe);
     const std::vector<std::uint32_t> nodes = pulled_nodes(one->model(0));
     for (const double k : {1., 2.})
       pull_for_a_step(*one, nodes, k);
   }
   // One that is taken back behind what is shown: the step before must be there again.
   const std::vector<std::uint32_t> nodes = pulled_nodes(s.model(0));
-  for (Simulation* one : {&s, &calm}) {
-    one->schedule(one->time() + dt / 2, SetForce{0, nodes, 5 * pull});
+  for (scene::Simulation* one : {&s, &calm}) {
+    one->schedule(one->time() + dt / 2, scene::SetForce{0, nodes, 5 * pull});
     one->schedule(one->time() + dt / 2, lobe_off());
   }
   EXPECT_THROW(s.step(dt), Error);
   EXPECT_EQ(s.object_count(), 1U);
   fail = false;
   for (int k = 0; k < 3; ++k) {
-    for (Simulation* one : {&s, &calm})
+    for (scene::Simulation* one : {&s, &calm})
       one->step(dt);
     ASSERT_EQ(s.object_count(), 2U);
     ASSERT_EQ(calm.object_count(), 2U);
@@ -267,25 +268,25 @@ TEST(SimulationMomentum, AStepThatFailsAndIsRepeatedGivesTheSame) {
 TEST(SimulationMomentum, AStepTakenBackBehindItsShapesLeavesTheOneBefore) {
   std::array<Vec3, 2> found;
   for (const bool disturbed : {false, true}) {
-    SimulationOptions how;
+    scene::SimulationOptions how;
     how.guard = true;
-    Simulation s(one_thread(), how);
-    s.add_object("organ", undragged(), Method::ffe);
+    scene::Simulation s(one_thread(), how);
+    s.add_object("organ", undragged(), scene::Method::ffe);
     bool missing = disturbed;
-    ObjectSource late{.model = [&] {
+    scene::ObjectSource late{.model = [&] {
       if (missing)
         throw Error("not now");
       return test::shell();
     }};
-    s.add_object("other", late, Method::ffe);
+    s.add_object("other", late, scene::Method::ffe);
     const std::vector<std::uint32_t> nodes = pulled_nodes(s.model(0));
     for (const double k : {1., 2.})
       pull_for_a_step(s, nodes, k);
     if (disturbed) {
-      s.apply(SetForce{0, nodes, 9. * pull});
-      s.apply(SetForce{1, {0}, {1, 0, 0}}); // shown last
+      s.apply(scene::SetForce{0, nodes, 9. * pull});
+      s.apply(scene::SetForce{1, {0}, {1, 0, 0}}); // shown last
       EXPECT_THROW(s.step(dt), Error);
-      s.apply(Release{1, {0}});
+      s.apply(scene::Release{1, {0}});
       missing = false;
     }
     let_go_and_cut(s, nodes);
@@ -297,38 +298,38 @@ TEST(SimulationMomentum, AStepTakenBackBehindItsShapesLeavesTheOneBefore) {
 }
 
 TEST(SimulationMomentum, WhatHangsLooselyIsAsFastAsItsShape) {
-  const Model model = test::shell();
+  const model::Model model = test::shell();
   const std::uint32_t top = highest(model);
   const std::vector<double> u = shape_under(model, {.gravity = {0, 0, -1}});
   double energy = 0;
   for (std::uint32_t i = 0; i < model.nodes.size(); ++i)
-    if (model.nodes[i].fixed == fixed_none)
+    if (model.nodes[i].fixed == model::fixed_none)
       energy += model.nodes[i].mass / 2 * dot(at(u, i), at(u, i)) / (dt * dt);
   for (const bool moving : {true, false})
     for (const bool disturbed : {false, true}) {
       bool fail = disturbed;
-      SimulationOptions how;
+      scene::SimulationOptions how;
       how.guard = true;
-      how.applied = [&](const Change& change) {
-        if (fail && std::holds_alternative<CutObject>(change))
+      how.applied = [&](const scene::Change& change) {
+        if (fail && std::holds_alternative<scene::CutObject>(change))
           throw Error("not now");
       };
-      Simulation s(one_thread(), how);
-      s.add_object("ball", model, Method::ffe);
+      scene::Simulation s(one_thread(), how);
+      s.add_object("ball", model, scene::Method::ffe);
       for (const double k : {1., 2.}) {
-        s.apply(SetGravity{{0, 0, -k}});
+        s.apply(scene::SetGravity{{0, 0, -k}});
         s.step(dt);
       }
       if (!moving)
         s.step(dt);
-      s.schedule(s.time() + dt / 2, CutObject{0, test::all_but_one(model, top)});
+      s.schedule(s.time() + dt / 2, scene::CutObject{0, test::all_but_one(model, top)});
       if (disturbed) {
         EXPECT_THROW(s.step(dt), Error);
       }
       fail = false;
       s.step(dt);
-      ASSERT_EQ(test::count(s, Cutting::Kind::loose), 1U);
-      ASSERT_EQ(s.object(0).method, Method::ela);
+      ASSERT_EQ(test::count(s, scene::Cutting::Kind::loose), 1U);
+      ASSERT_EQ(s.object(0).method, scene::Method::ela);
       const double should = moving ? energy : 0;
       EXPECT_LE(std::abs(s.state().kinetic_energy - should), 1e-8 * should);
     }
@@ -336,9 +337,9 @@ TEST(SimulationMomentum, WhatHangsLooselyIsAsFastAsItsShape) {
 
 /// Stiffnesses of its own, whatever exp2ela's defaults are: the lobe hangs on soft springs, so that
 /// it tears off as one, with what holds it.
-Model soft_below_the_lobe() {
-  Model model = undragged();
-  for (Spring& spring : model.springs) {
+model::Model soft_below_the_lobe() {
+  model::Model model = undragged();
+  for (model::Spring& spring : model.springs) {
     const bool crosses =
         (model.nodes[spring.i].position.z > 41) != (model.nodes[spring.j].position.z > 41);
     spring.stiffness = crosses ? 5 : 1000;
@@ -347,28 +348,28 @@ Model soft_below_the_lobe() {
 }
 
 TEST(SimulationMomentum, WhatTearsOffGoesOnWithTheStepThatToreIt) {
-  const Model model = soft_below_the_lobe();
-  Simulation s(one_thread(), {});
-  s.add_object("organ", model, Method::ffe);
+  const model::Model model = soft_below_the_lobe();
+  scene::Simulation s(one_thread(), {});
+  s.add_object("organ", model, scene::Method::ffe);
   std::vector<std::uint32_t> lobe, cut;
   for (std::uint32_t i = 0; i < model.nodes.size(); ++i) {
     if (model.nodes[i].position.z > 41)
       lobe.push_back(i);
-    if (model.nodes[i].position.x < 112 || i >= surface_count(model))
+    if (model.nodes[i].position.x < 112 || i >= model::surface_count(model))
       cut.push_back(i); // all but a bridge
   }
   const auto pulled = [&](int k) {
-    s.apply(SetDisplacement{0, lobe, {0, 0, 1. * k}});
+    s.apply(scene::SetDisplacement{0, lobe, {0, 0, 1. * k}});
     s.step(dt);
   };
   pulled(1);
-  CutObject max = lobe_off();
-  std::get<PlaneToCut>(max.what).nodes = cut;
+  scene::CutObject max = lobe_off();
+  std::get<scene::PlaneToCut>(max.what).nodes = cut;
   s.apply(max);
   ASSERT_EQ(s.object_count(), 1U);
   for (std::uint32_t& node : lobe)
     node = s.object(0).places[node];
-  s.apply(SetTear{0, 0.4});
+  s.apply(scene::SetTear{0, 0.4});
   for (int k = 2; k < 20 && s.object_count() == 1; ++k)
     pulled(k);
   const std::size_t parts = s.object_count();
@@ -376,15 +377,15 @@ TEST(SimulationMomentum, WhatTearsOffGoesOnWithTheStepThatToreIt) {
   for (std::size_t part = 1; part < parts; ++part) {
     std::vector<std::uint32_t> all(s.model(part).nodes.size());
     std::iota(all.begin(), all.end(), 0U);
-    s.apply(Release{part, all});
-    s.apply(SetTear{part, 0});
+    s.apply(scene::Release{part, all});
+    s.apply(scene::SetTear{part, 0});
   }
   for (std::size_t part = 1; part < parts; ++part) {
-    const Vec3 is = momentum(s, part) / total_mass(s.model(part));
+    const Vec3 is = momentum(s, part) / model::total_mass(s.model(part));
     EXPECT_GT(is.z, 0.3 / dt); // a third of its nodes was held, or more
     EXPECT_LT(is.z, 1.0001 / dt);
   }
 }
 
 } // namespace
-} // namespace gewebe
+} // namespace gewebe::test

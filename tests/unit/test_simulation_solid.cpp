@@ -30,37 +30,37 @@
 #include <utility>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::test {
 namespace {
 
 using test::one_thread, test::settle, test::shape;
 using Numbers = std::vector<double>;
 
 /// A bar 20 × 8 × 8 mm along x, held at x = 0.
-Model bar(bool quadratic = true, double poisson = 0.45) {
-  SolidModelOptions options;
+model::Model bar(bool quadratic = true, double poisson = 0.45) {
+  fem::SolidModelOptions options;
   options.material.materials = {{"gel", 1e-3, 2e4, 1, 0.2, poisson}};
   options.quadratic = quadratic;
-  Model model = solid_model(test::box_tetrahedra(5, 2, 2, 4), options, {});
-  for (Node& node : model.nodes)
+  model::Model model = fem::solid_model(test::box_tetrahedra(5, 2, 2, 4), options, {});
+  for (model::Node& node : model.nodes)
     if (node.position.x == 0)
-      node.fixed = fixed_all;
+      node.fixed = model::fixed_all;
   return model;
 }
 
-std::vector<std::uint32_t> end_of(const Model& model) {
+std::vector<std::uint32_t> end_of(const model::Model& model) {
   std::vector<std::uint32_t> nodes;
-  for (std::uint32_t i = 0; i < surface_count(model); ++i)
+  for (std::uint32_t i = 0; i < model::surface_count(model); ++i)
     if (model.nodes[i].position.x > 20 - 1e-9)
       nodes.push_back(i);
   return nodes;
 }
 
 /// Well damped.
-SolidChoice damped(SolidLaw law = SolidLaw::corotational) {
-  SolidChoice choice;
+integrator::SolidChoice damped(integrator::SolidLaw law = integrator::SolidLaw::corotational) {
+  integrator::SolidChoice choice;
   choice.law = law;
-  choice.damping = damping_per_stiffness(0.5, 20);
+  choice.damping = integrator::damping_per_stiffness(0.5, 20);
   return choice;
 }
 
@@ -71,53 +71,55 @@ double largest(std::span<const double> values) {
   return most;
 }
 
-std::unique_ptr<Simulation> scene(const Model& model, Method method, const SolidChoice& choice,
-                                  SimulationOptions options = {}, Context context = one_thread()) {
-  auto s = std::make_unique<Simulation>(context, std::move(options));
-  s->add_object("o", model, method, {}, Integration::semi_implicit, choice);
+std::unique_ptr<scene::Simulation> scene(const model::Model& model, scene::Method method,
+                                         const integrator::SolidChoice& choice,
+                                         scene::SimulationOptions options = {},
+                                         Context context = one_thread()) {
+  auto s = std::make_unique<scene::Simulation>(context, std::move(options));
+  s->add_object("o", model, method, {}, scene::Integration::semi_implicit, choice);
   return s;
 }
 
-double volume(const Model& model, std::span<const double> u) {
+double volume(const model::Model& model, std::span<const double> u) {
   double sum = 0;
   for (const Tetrahedron& t : model.tetrahedra) {
     std::array<Vec3, 4> p;
     for (std::size_t k = 0; k < 4; ++k)
       p[k] = model.nodes[t[k]].position + (u.empty() ? Vec3{} : vector_at(u, t[k]));
-    sum += tetrahedron_volume(p[0], p[1], p[2], p[3]);
+    sum += tetrahedra::tetrahedron_volume(p[0], p[1], p[2], p[3]);
   }
   return sum;
 }
 
-class MovingSolid : public testing::TestWithParam<SolidLaw> {};
+class MovingSolid : public testing::TestWithParam<integrator::SolidLaw> {};
 
 TEST_P(MovingSolid, RestsWhereStaticsSaysUnderSmallLoads) {
   for (const bool quadratic : {true, false}) {
-    if (GetParam() == SolidLaw::hyperelastic && quadratic)
+    if (GetParam() == integrator::SolidLaw::hyperelastic && quadratic)
       continue; // slow; solid_motion's own tests have it
-    const Model model = bar(quadratic);
+    const model::Model model = bar(quadratic);
     const std::vector<std::uint32_t> end = end_of(model);
-    const std::vector<std::pair<std::string, std::function<void(Simulation&)>>> loads{
+    const std::vector<std::pair<std::string, std::function<void(scene::Simulation&)>>> loads{
         {"weight",
-         [](Simulation& s) {
-           s.apply(SetGravity{{0.4, 0, -1}});
+         [](scene::Simulation& s) {
+           s.apply(scene::SetGravity{{0.4, 0, -1}});
          }},
         {"force",
-         [&](Simulation& s) {
-           s.apply(SetForce{0, {end[0]}, {0, 2, 1}});
+         [&](scene::Simulation& s) {
+           s.apply(scene::SetForce{0, {end[0]}, {0, 2, 1}});
          }},
         {"pressure",
-         [&](Simulation& s) {
-           s.apply(SetPressure{0, end, {-1, 0}});
+         [&](scene::Simulation& s) {
+           s.apply(scene::SetPressure{0, end, {-1, 0}});
          }},
-        {"displacement", [&](Simulation& s) {
-           s.apply(SetGravity{{0, 0, -0.05}});
-           s.apply(SetDisplacement{0, {end[1], end[2]}, {0, 2e-5, 1e-4}});
+        {"displacement", [&](scene::Simulation& s) {
+           s.apply(scene::SetGravity{{0, 0, -0.05}});
+           s.apply(scene::SetDisplacement{0, {end[1], end[2]}, {0, 2e-5, 1e-4}});
          }}};
     for (const auto& [name, act] : loads) {
       SCOPED_TRACE(name + (quadratic ? " quadratic" : " linear"));
-      const auto still = scene(model, Method::ffe, {}),
-                 moving = scene(model, Method::ela, damped(GetParam()));
+      const auto still = scene(model, scene::Method::ffe, {}),
+                 moving = scene(model, scene::Method::ela, damped(GetParam()));
       act(*still);
       act(*moving);
       still->step(0.1);
@@ -137,10 +139,10 @@ TEST_P(MovingSolid, RestsWhereStaticsSaysUnderSmallLoads) {
 }
 
 TEST_P(MovingSolid, KeepsItsVolumeUnderItsWeight) {
-  const bool quadratic = GetParam() == SolidLaw::corotational;
-  const Model model = bar(quadratic, 0.49);
-  const auto moving = scene(model, Method::ela, damped(GetParam()));
-  moving->apply(SetGravity{{0, 0, -9810}});
+  const bool quadratic = GetParam() == integrator::SolidLaw::corotational;
+  const model::Model model = bar(quadratic, 0.49);
+  const auto moving = scene(model, scene::Method::ela, damped(GetParam()));
+  moving->apply(scene::SetGravity{{0, 0, -9810}});
   double most = 0;
   for (int k = 0; k < 20; ++k) {
     moving->step(0.01);
@@ -152,37 +154,39 @@ TEST_P(MovingSolid, KeepsItsVolumeUnderItsWeight) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Laws, MovingSolid,
-                         testing::Values(SolidLaw::corotational, SolidLaw::hyperelastic),
+                         testing::Values(integrator::SolidLaw::corotational,
+                                         integrator::SolidLaw::hyperelastic),
                          [](const auto& of) {
-                           return of.param == SolidLaw::corotational ? "corotational"
-                                                                     : "neo_hookean";
+                           return of.param == gewebe::integrator::SolidLaw::corotational
+                                      ? "corotational"
+                                      : "neo_hookean";
                          });
 
 /// A pressure turns with the face that it is on: tongs turn the end down and bear what it adds.
 TEST(SimulationSolid, PressureFollowsTheShape) {
-  const Model model = bar();
+  const model::Model model = bar();
   const std::vector<std::uint32_t> end = end_of(model);
   std::vector<std::uint32_t> inner; // whose triangles are all of the face
-  Load load;
+  contact::Load load;
   for (const std::uint32_t node : end)
     if (const Vec3& p = model.nodes[node].position; p.y > 0 && p.y < 8 && p.z > 0 && p.z < 8) {
       inner.push_back(node);
       load.pressure[node] = {3000, 0};
     }
   double whole = 0;
-  for (const auto& [node, force] : load_at(load, model, 0).force)
+  for (const auto& [node, force] : contact::load_at(load, model, 0).force)
     whole += force.x;
   EXPECT_GT(whole, 3000 * 30);
   Vec3 held;
   for (const double pressure : {0.0, 3000.0}) {
-    const auto s = scene(model, Method::ela, damped());
-    s->apply(SetInstrument{0, {0.5, {}, 0}, {{40, 4, 4}, {}}, "tongs"});
-    s->apply(Grasp{0, end, 0});
-    s->apply(MoveInstrument{0, {18, 4, -28}, turn_about({0, 1, 0}, 90), 0.2});
-    s->apply(SetPressure{0, inner, {pressure, 0}});
+    const auto s = scene(model, scene::Method::ela, damped());
+    s->apply(scene::SetInstrument{0, {0.5, {}, 0}, {{40, 4, 4}, {}}, "tongs"});
+    s->apply(scene::Grasp{0, end, 0});
+    s->apply(scene::MoveInstrument{0, {18, 4, -28}, contact::turn_about({0, 1, 0}, 90), 0.2});
+    s->apply(scene::SetPressure{0, inner, {pressure, 0}});
     s->step(0.2);
     settle(*s);
-    for (const NodeVector& f : s->contact_forces(0))
+    for (const contact::NodeVector& f : s->contact_forces(0))
       held += (pressure > 0 ? 1 : -1) * f.value;
   }
   EXPECT_NEAR(held.z, whole, 1e-6 * whole);
@@ -190,11 +194,11 @@ TEST(SimulationSolid, PressureFollowsTheShape) {
 }
 
 TEST(SimulationSolid, DisplacedNodesStandExactlyAndGoTheirWay) {
-  const Model model = bar();
+  const model::Model model = bar();
   const std::vector<std::uint32_t> end = end_of(model);
   const Vec3 to{0.1, -0.3, 1.7};
-  const auto s = scene(model, Method::ela, damped());
-  s->apply(SetDisplacement{0, end, to});
+  const auto s = scene(model, scene::Method::ela, damped());
+  s->apply(scene::SetDisplacement{0, end, to});
   s->step(0); // at once
   EXPECT_EQ(vector_at(s->displacement(0), end[0]), to);
   ASSERT_EQ(s->contact_forces(0).size(), end.size());
@@ -202,26 +206,26 @@ TEST(SimulationSolid, DisplacedNodesStandExactlyAndGoTheirWay) {
   s->step(0.05);
   EXPECT_EQ(vector_at(s->displacement(0), end[0]), to);
   const Vec3 back{0, 0.2, 0.3};
-  s->apply(SetDisplacement{0, end, back, 0.1});
+  s->apply(scene::SetDisplacement{0, end, back, 0.1});
   s->step(0.05);
   const Vec3 halfway = vector_at(s->displacement(0), end[0]);
   EXPECT_NEAR(norm(halfway - 0.5 * (to + back)), 0, 1e-12);
   s->step(0.05);
   EXPECT_EQ(vector_at(s->displacement(0), end[0]), back);
   // Let go it comes back.
-  s->apply(Release{0, end});
+  s->apply(scene::Release{0, end});
   settle(*s);
   EXPECT_LT(largest(s->displacement(0)), 1e-6);
 }
 
 TEST(SimulationSolid, AllNodesHeldGoTheirWayToo) {
-  const Model model = bar(false);
-  const auto s = scene(model, Method::ela, damped());
+  const model::Model model = bar(false);
+  const auto s = scene(model, scene::Method::ela, damped());
   std::vector<std::uint32_t> free;
   for (std::uint32_t i = 0; i < model.nodes.size(); ++i)
-    if (model.nodes[i].fixed == fixed_none)
+    if (model.nodes[i].fixed == model::fixed_none)
       free.push_back(i);
-  s->apply(SetDisplacement{0, free, {1, 0, 0}, 0.1});
+  s->apply(scene::SetDisplacement{0, free, {1, 0, 0}, 0.1});
   s->step(0.05);
   EXPECT_NEAR(vector_at(s->displacement(0), free[0]).x, 0.5, 1e-12);
   s->step(0.05);
@@ -230,14 +234,14 @@ TEST(SimulationSolid, AllNodesHeldGoTheirWayToo) {
 }
 
 TEST(SimulationSolid, AFreeBodyFallsAndIsPushedByItsForce) {
-  Model model = bar();
-  for (Node& node : model.nodes) {
-    node.fixed = fixed_none;
+  model::Model model = bar();
+  for (model::Node& node : model.nodes) {
+    node.fixed = model::fixed_none;
     node.drag = 0;
   }
-  const auto s = scene(model, Method::ela, {});
-  s->apply(SetGravity{{0, 0, -9810}});
-  s->apply(SetTimestep{1e-3});
+  const auto s = scene(model, scene::Method::ela, {});
+  s->apply(scene::SetGravity{{0, 0, -9810}});
+  s->apply(scene::SetTimestep{1e-3});
   s->step(0.1);
   double mass = 0, fallen = 0;
   for (std::uint32_t i = 0; i < model.nodes.size(); ++i) {
@@ -250,22 +254,22 @@ TEST(SimulationSolid, AFreeBodyFallsAndIsPushedByItsForce) {
 
 /// From ffe to ela the shape stays; at rest there nothing moves, and back it does not jump.
 TEST(SimulationSolid, ChangesItsMethodWithoutAJump) {
-  const Model model = bar();
+  const model::Model model = bar();
   const std::vector<std::uint32_t> end = end_of(model);
-  const auto s = scene(model, Method::ffe, damped());
-  s->apply(SetGravity{{0, 0, -2}});
-  s->apply(SetForce{0, {end[0]}, {0, 3, 0}});
-  s->apply(SetDisplacement{0, {end[3]}, {0, 1e-3, 0}});
+  const auto s = scene(model, scene::Method::ffe, damped());
+  s->apply(scene::SetGravity{{0, 0, -2}});
+  s->apply(scene::SetForce{0, {end[0]}, {0, 3, 0}});
+  s->apply(scene::SetDisplacement{0, {end[3]}, {0, 1e-3, 0}});
   s->step(0.1);
   const Numbers before = shape(*s, 0);
   EXPECT_GT(largest(before), 1e-4);
-  s->apply(SetMethod{0, Method::ela});
+  s->apply(scene::SetMethod{0, scene::Method::ela});
   s->step(0);
   EXPECT_LE(test::largest_difference(shape(*s, 0), before), 1e-12 * 20);
   s->step(0.01);
   EXPECT_LE(test::largest_difference(shape(*s, 0), before), 1e-4 * largest(before));
   settle(*s);
-  s->apply(SetMethod{0, Method::ffe});
+  s->apply(scene::SetMethod{0, scene::Method::ffe});
   s->step(0.1);
   EXPECT_LE(test::largest_difference(shape(*s, 0), before), 1e-12 * 20);
   ASSERT_EQ(s->news().jumps.size(), 1U);
@@ -273,53 +277,53 @@ TEST(SimulationSolid, ChangesItsMethodWithoutAJump) {
 }
 
 TEST(SimulationSolid, GraspedNodesTurnWithTheirInstrument) {
-  const Model model = bar();
+  const model::Model model = bar();
   const std::vector<std::uint32_t> end = end_of(model);
-  const auto s = scene(model, Method::ela, damped());
-  s->apply(SetInstrument{0, {0.5, {}, 0}, {{40, 4, 4}, {}}, "tongs"}); // beside it
-  s->apply(Grasp{0, end, 0});
-  s->apply(MoveInstrument{0, {40, 4, 4}, turn_about({1, 0, 0}, 90), 0.2});
+  const auto s = scene(model, scene::Method::ela, damped());
+  s->apply(scene::SetInstrument{0, {0.5, {}, 0}, {{40, 4, 4}, {}}, "tongs"}); // beside it
+  s->apply(scene::Grasp{0, end, 0});
+  s->apply(scene::MoveInstrument{0, {40, 4, 4}, contact::turn_about({1, 0, 0}, 90), 0.2});
   s->step(0.3);
   for (const std::uint32_t node : end) {
     const Vec3 p = model.nodes[node].position, u = vector_at(s->displacement(0), node);
     EXPECT_NEAR(norm(p + u - Vec3{20, 4 - (p.z - 4), 4 + (p.y - 4)}), 0, 1e-9);
   }
   settle(*s);
-  const InstrumentReport report = s->instrument(0);
+  const scene::InstrumentReport report = s->instrument(0);
   EXPECT_GT(report.torque.x * -1, 1e3); // it wants back
-  s->apply(Withdraw{0});
+  s->apply(scene::Withdraw{0});
   settle(*s);
   EXPECT_LT(largest(s->displacement(0)), 1e-5);
 }
 
 /// Steps of one length up to rounding keep their factor; what rests costs nothing.
 TEST(SimulationSolid, OneFactorServesAllStepsAndRestIsFree) {
-  const auto s = scene(bar(), Method::ela, damped());
-  s->apply(SetGravity{{0, 0, -9810}});
+  const auto s = scene(bar(), scene::Method::ela, damped());
+  s->apply(scene::SetGravity{{0, 0, -9810}});
   for (int k = 0; k < 30; ++k)
     s->step(0.1);
-  const SimulationCounts counts = s->counts();
+  const scene::SimulationCounts counts = s->counts();
   EXPECT_EQ(counts.solids.factors, 1U);
   EXPECT_EQ(counts.solids.steps, counts.integration);
   EXPECT_GE(counts.solids.rounds, counts.solids.steps);
   EXPECT_EQ(counts.solids.unfinished, 0U);
   EXPECT_GT(counts.resting, 0U);
-  s->apply(SetGravity{{0, 0, -9000}}); // wakes it
+  s->apply(scene::SetGravity{{0, 0, -9000}}); // wakes it
   s->step(0.1);
   EXPECT_GT(s->counts().integration, counts.integration);
 }
 
 TEST(SimulationSolid, TheSameBytesOnAnyNumberOfThreads) {
-  const Model model = bar();
+  const model::Model model = bar();
   const std::vector<std::uint32_t> end = end_of(model);
   const auto end_shape = [&](int threads) {
     Context context;
     context.threads = threads;
-    const auto s = scene(model, Method::ela, {}, {}, context);
-    s->apply(SetGravity{{0, 0, -9810}});
-    s->apply(SetPressure{0, end, {800, 0.03}});
+    const auto s = scene(model, scene::Method::ela, {}, {}, context);
+    s->apply(scene::SetGravity{{0, 0, -9810}});
+    s->apply(scene::SetPressure{0, end, {800, 0.03}});
     s->step(0.05);
-    s->apply(SetDisplacement{0, {end[0]}, {0, 0, 2}, 0.02});
+    s->apply(scene::SetDisplacement{0, {end[0]}, {0, 0, 2}, 0.02});
     s->step(0.05);
     return shape(*s, 0);
   };
@@ -329,18 +333,18 @@ TEST(SimulationSolid, TheSameBytesOnAnyNumberOfThreads) {
 }
 
 TEST(SimulationSolid, AStepThatCannotBeginIsTakenBack) {
-  const Model model = bar();
+  const model::Model model = bar();
   const std::vector<std::uint32_t> end = end_of(model);
   const auto run = [&](bool fails) {
-    const auto s = scene(model, Method::ela, {}, {.guard = true});
-    s->apply(SetGravity{{0, 0, -9810}});
+    const auto s = scene(model, scene::Method::ela, {}, {.guard = true});
+    s->apply(scene::SetGravity{{0, 0, -9810}});
     s->step(0.05);
     const Numbers before = shape(*s, 0);
     if (fails) {
-      s->apply(SetForce{0, {end[1]}, {0, 0, 1e300}});
+      s->apply(scene::SetForce{0, {end[1]}, {0, 0, 1e300}});
       EXPECT_THROW(s->step(0.02), Error);
       EXPECT_EQ(shape(*s, 0), before);
-      s->apply(SetForce{0, {end[1]}, {}});
+      s->apply(scene::SetForce{0, {end[1]}, {}});
     }
     s->step(0.02);
     EXPECT_NE(shape(*s, 0), before);
@@ -350,7 +354,7 @@ TEST(SimulationSolid, AStepThatCannotBeginIsTakenBack) {
 }
 
 TEST(SimulationSolid, AStepThatFailsIsTakenBack) {
-  const Model model = bar();
+  const model::Model model = bar();
   const std::vector<std::uint32_t> end = end_of(model);
   // A step of ten integration steps is given up when it was asked for the `last` time: in the midst
   // of the rounds of one of them.
@@ -359,22 +363,22 @@ TEST(SimulationSolid, AStepThatFailsIsTakenBack) {
     Context context = one_thread();
     asked = 0;
     context.cancelled = [&] { return ++asked == last; };
-    const auto s = scene(model, Method::ela, {}, {.guard = true}, context);
-    s->apply(SetGravity{{0, 0, -9810}});
+    const auto s = scene(model, scene::Method::ela, {}, {.guard = true}, context);
+    s->apply(scene::SetGravity{{0, 0, -9810}});
     s->step(0.05);
     const Numbers before = shape(*s, 0);
     const std::uint64_t taken = s->counts().integration;
-    s->apply(SetTimestep{0.002});
+    s->apply(scene::SetTimestep{0.002});
     first = asked;
     if (fails) {
-      s->apply(SetForce{0, {end[1]}, {0, 0, 1e4}});
+      s->apply(scene::SetForce{0, {end[1]}, {0, 0, 1e4}});
       EXPECT_THROW(s->step(0.02), Cancelled);
       EXPECT_EQ(asked, last);
       EXPECT_GT(last, first + 20);
       EXPECT_EQ(shape(*s, 0), before);
       EXPECT_EQ(s->time(), 0.05);
       EXPECT_EQ(s->counts().integration, taken);
-      s->apply(SetForce{0, {end[1]}, {}});
+      s->apply(scene::SetForce{0, {end[1]}, {}});
     }
     s->step(0.02);
     EXPECT_GT(s->counts().integration, taken + 5);
@@ -389,39 +393,40 @@ TEST(SimulationSolid, AStepThatFailsIsTakenBack) {
 
 /// Of a body that has turned as a whole stresses are those of its strain, told in space.
 TEST(SimulationSolid, StressesOfTurnedElementsAreThoseOfTheirStrain) {
-  const Model model = bar();
-  const TetMesh mesh = element_mesh(model);
-  const std::vector<SolidMaterial> materials = element_materials(model);
-  const std::vector<SolidElement> elements = solid_elements(mesh, materials);
-  const Quaternion turn = turn_about({1, 2, 3}, 130);
+  const model::Model model = bar();
+  const tetrahedra::TetMesh mesh = fem::element_mesh(model);
+  const std::vector<fem::SolidMaterial> materials = fem::element_materials(model);
+  const std::vector<fem::SolidElement> elements = fem::solid_elements(mesh, materials);
+  const contact::Quaternion turn = contact::turn_about({1, 2, 3}, 130);
   Numbers stretched, turned;
-  for (const Node& node : model.nodes) {
+  for (const model::Node& node : model.nodes) {
     const Vec3 p = node.position, to = {1.02 * p.x, 0.99 * p.y, p.z},
-               there = rotated(turn, to) + Vec3{3, 1, 2};
+               there = contact::rotated(turn, to) + Vec3{3, 1, 2};
     for (int a = 0; a < 3; ++a) {
       stretched.push_back(to[a] - p[a]);
       turned.push_back(there[a] - p[a]);
     }
   }
-  const auto at_rest = solid_fields(mesh, materials, elements, stretched),
-             in_space = solid_fields(mesh, materials, elements, turned, {}, StrainFrames::elements);
+  const auto at_rest = fem::solid_fields(mesh, materials, elements, stretched),
+             in_space = fem::solid_fields(mesh, materials, elements, turned, {},
+                                          fem::StrainFrames::elements);
   double largest_stress = 0;
   for (std::size_t i = 0; i < model.nodes.size(); ++i)
-    largest_stress = test::larger(largest_stress, von_mises(at_rest.node_stress[i]));
+    largest_stress = test::larger(largest_stress, fem::von_mises(at_rest.node_stress[i]));
   EXPECT_GT(largest_stress, 100);
-  const auto along = [](const SymmetricBlock& s, const Vec3& n) {
+  const auto along = [](const linalg::SymmetricBlock& s, const Vec3& n) {
     return s[0] * n.x * n.x + s[3] * n.y * n.y + s[5] * n.z * n.z +
            2 * (s[1] * n.x * n.y + s[2] * n.x * n.z + s[4] * n.y * n.z);
   };
   for (std::size_t i = 0; i < model.nodes.size(); ++i)
     for (const Vec3& n : {Vec3{1, 0, 0}, Vec3{0, 1, 0}, Vec3{0.6, 0, 0.8}})
-      EXPECT_NEAR(along(in_space.node_stress[i], rotated(turn, n)),
+      EXPECT_NEAR(along(in_space.node_stress[i], contact::rotated(turn, n)),
                   along(at_rest.node_stress[i], n), 1e-8 * largest_stress);
 }
 
-std::string refusal(const Model& model, const SolidChoice& choice = {}) {
+std::string refusal(const model::Model& model, const integrator::SolidChoice& choice = {}) {
   try {
-    (void)scene(model, Method::ela, choice);
+    (void)scene(model, scene::Method::ela, choice);
   } catch (const Error& error) {
     return error.what();
   }
@@ -429,22 +434,22 @@ std::string refusal(const Model& model, const SolidChoice& choice = {}) {
 }
 
 TEST(SimulationSolid, RefusesWhatItCantMove) {
-  Model model = bar(false);
+  model::Model model = bar(false);
   EXPECT_EQ(refusal(model), "");
-  Model light = model;
+  model::Model light = model;
   light.nodes[3].mass /= 2;
   EXPECT_NE(refusal(light).find("object o: node 3 has a mass of"), std::string::npos);
-  Model loose = model;
+  model::Model loose = model;
   loose.nodes.push_back({.position = {99, 0, 0}, .mass = 1, .drag = 1});
   EXPECT_NE(refusal(loose).find("is in no tetrahedron"), std::string::npos);
   EXPECT_NE(refusal(test::organ(1), damped()).find("has no tetrahedra"), std::string::npos);
 }
 
 /// How deep the deepest node is in a sphere.
-double depth(const Simulation& s, const Model& model, double radius) {
+double depth(const scene::Simulation& s, const model::Model& model, double radius) {
   const Vec3 centre = s.instrument(0).pose.place;
   double deepest = -HUGE_VAL;
-  for (std::uint32_t i = 0; i < surface_count(model); ++i)
+  for (std::uint32_t i = 0; i < model::surface_count(model); ++i)
     deepest = test::larger(
         deepest, radius - norm(model.nodes[i].position + vector_at(s.displacement(0), i) - centre));
   return deepest;
@@ -452,12 +457,13 @@ double depth(const Simulation& s, const Model& model, double radius) {
 
 /// Pressed slowly a solid pushes back as the elastostatic one does; no node is in the instrument.
 TEST(SimulationSolid, AnInstrumentPressesAsStaticsSays) {
-  const Model model = bar();
-  const auto still = scene(model, Method::ffe, {}), moving = scene(model, Method::ela, damped());
-  for (Simulation* const s : {still.get(), moving.get()}) {
-    s->apply(SetInstrument{0, {4, {}, 0}, {{18, 4, 12.5}, {}}, "probe"});
+  const model::Model model = bar();
+  const auto still = scene(model, scene::Method::ffe, {}),
+             moving = scene(model, scene::Method::ela, damped());
+  for (scene::Simulation* const s : {still.get(), moving.get()}) {
+    s->apply(scene::SetInstrument{0, {4, {}, 0}, {{18, 4, 12.5}, {}}, "probe"});
     s->step(0.01);
-    s->apply(MoveInstrument{0, {18, 4, 11.98}, {}, 0.1}); // 0.02 mm deep
+    s->apply(scene::MoveInstrument{0, {18, 4, 11.98}, {}, 0.1}); // 0.02 mm deep
     for (int k = 0; k < 20; ++k) {
       s->step(0.02);
       EXPECT_LE(depth(*s, model, 4), 4 * 2e-4);
@@ -465,13 +471,13 @@ TEST(SimulationSolid, AnInstrumentPressesAsStaticsSays) {
   }
   settle(*moving);
   EXPECT_LE(depth(*moving, model, 4), 4 * 2e-4);
-  const InstrumentReport a = still->instrument(0), b = moving->instrument(0);
+  const scene::InstrumentReport a = still->instrument(0), b = moving->instrument(0);
   EXPECT_GT(a.nodes, 0U);
   EXPECT_GT(a.force.z, 10);
   EXPECT_LE(norm(a.force - b.force), 0.03 * norm(a.force));
   EXPECT_LE(test::largest_difference(shape(*moving, 0), shape(*still, 0)),
             0.03 * largest(shape(*still, 0)));
-  moving->apply(MoveInstrument{0, {18, 4, 40}, {}, 0});
+  moving->apply(scene::MoveInstrument{0, {18, 4, 40}, {}, 0});
   settle(*moving);
   EXPECT_EQ(moving->instrument(0).nodes, 0U);
   EXPECT_LE(largest(shape(*moving, 0)), 1e-5);
@@ -480,11 +486,11 @@ TEST(SimulationSolid, AnInstrumentPressesAsStaticsSays) {
 /// Swept by a fast instrument, and by one that jumps, nodes are pushed along and not passed.
 TEST(SimulationSolid, NoInstrumentPassesIt) {
   for (const double duration : {0.05, 0.0}) {
-    const Model model = bar();
-    const auto s = scene(model, Method::ela, damped());
-    s->apply(SetInstrument{0, {5, {0, 8, 0}, 0}, {{18, 0, 15}, {}}, "rod"});
+    const model::Model model = bar();
+    const auto s = scene(model, scene::Method::ela, damped());
+    s->apply(scene::SetInstrument{0, {5, {0, 8, 0}, 0}, {{18, 0, 15}, {}}, "rod"});
     s->step(0.01);
-    s->apply(MoveInstrument{0, {18, 0, 5}, {}, duration});
+    s->apply(scene::MoveInstrument{0, {18, 0, 5}, {}, duration});
     s->step(0.05);
     s->step(0.05);
     double lowest = HUGE_VAL;
@@ -496,18 +502,18 @@ TEST(SimulationSolid, NoInstrumentPassesIt) {
 }
 
 TEST(SimulationSolid, WhatInstrumentsDoIsTheSameOnAnyThreadsAndBehindAStepBack) {
-  const Model model = bar();
+  const model::Model model = bar();
   const auto run = [&](int threads, bool back) {
     Context context;
     context.threads = threads;
-    const auto s = scene(model, Method::ela, {}, {.guard = true}, context);
-    s->apply(SetInstrument{0, {4, {}, 0.4}, {{18, 4, 12.5}, {}}, "probe"});
-    s->apply(MoveInstrument{0, {17, 4.5, 11}, {}, 0.1});
+    const auto s = scene(model, scene::Method::ela, {}, {.guard = true}, context);
+    s->apply(scene::SetInstrument{0, {4, {}, 0.4}, {{18, 4, 12.5}, {}}, "probe"});
+    s->apply(scene::MoveInstrument{0, {17, 4.5, 11}, {}, 0.1});
     s->step(0.05);
     if (back) {
-      s->apply(SetForce{0, {1}, {0, 0, 1e300}});
+      s->apply(scene::SetForce{0, {1}, {0, 0, 1e300}});
       EXPECT_THROW(s->step(0.02), Error);
-      s->apply(SetForce{0, {1}, {}});
+      s->apply(scene::SetForce{0, {1}, {}});
     }
     s->step(0.05);
     s->step(0.05);
@@ -522,15 +528,15 @@ TEST(SimulationSolid, WhatInstrumentsDoIsTheSameOnAnyThreadsAndBehindAStepBack) 
 /// Pulled aside by 20 mm, its own length, within 0.05 s: steps by the tolerance that
 /// is usual against solved ones.
 TEST(SolidScene, FollowsALongPullAsSolvedStepsDo) {
-  const Model model = bar(true, 0.49);
+  const model::Model model = bar(true, 0.49);
   std::vector<Numbers> path[2];
   for (const bool solved : {false, true}) {
-    SolidChoice choice = damped();
+    integrator::SolidChoice choice = damped();
     if (solved)
       choice.tolerance = 1e-8;
-    Simulation s(one_thread(), {});
-    s.add_object("o", model, Method::ela, {}, Integration::semi_implicit, choice);
-    s.apply(SetDisplacement{0, end_of(model), {-8, 0, 20}, 0.05});
+    scene::Simulation s(one_thread(), {});
+    s.add_object("o", model, scene::Method::ela, {}, scene::Integration::semi_implicit, choice);
+    s.apply(scene::SetDisplacement{0, end_of(model), {-8, 0, 20}, 0.05});
     for (int k = 0; k < 12; ++k) {
       s.step(1.0 / 60);
       path[solved ? 1 : 0].emplace_back(s.displacement(0).begin(), s.displacement(0).end());
@@ -544,7 +550,7 @@ TEST(SolidScene, FollowsALongPullAsSolvedStepsDo) {
   EXPECT_LT(most, 0.01);
 }
 
-std::uint32_t node_at(const Model& model, const Vec3& place) {
+std::uint32_t node_at(const model::Model& model, const Vec3& place) {
   for (std::uint32_t i = 0; i < model.nodes.size(); ++i)
     if (norm(model.nodes[i].position - place) < 1e-9)
       return i;
@@ -555,37 +561,37 @@ std::uint32_t node_at(const Model& model, const Vec3& place) {
 /// The surface of a body that nothing else holds.
 TEST(SolidScene, AFreeBodyIsHeldWhereItsSurfaceIsDisplaced) {
   for (const bool quadratic : {true, false}) {
-    Model model = bar(quadratic);
-    for (Node& node : model.nodes)
-      node.fixed = fixed_none;
-    Simulation s(one_thread(), {.guard = true});
-    s.add_object("o", model, Method::ffe);
-    std::vector<std::uint32_t> all(surface_count(model));
+    model::Model model = bar(quadratic);
+    for (model::Node& node : model.nodes)
+      node.fixed = model::fixed_none;
+    scene::Simulation s(one_thread(), {.guard = true});
+    s.add_object("o", model, scene::Method::ffe);
+    std::vector<std::uint32_t> all(model::surface_count(model));
     for (std::uint32_t i = 0; i < all.size(); ++i)
       all[i] = i;
-    s.apply(SetDisplacement{0, all, {1, 2, 3}});
+    s.apply(scene::SetDisplacement{0, all, {1, 2, 3}});
     s.step(0.01);
     for (std::size_t i = 0; i < model.nodes.size(); ++i)
       EXPECT_LT(norm(vector_at(s.displacement(0), i) - Vec3{1, 2, 3}), 1e-9) << i;
     const std::vector<std::uint32_t> corners{all[0], node_at(model, {20, 0, 0}),
                                              node_at(model, {0, 8, 0})};
     std::erase_if(all, [&](std::uint32_t i) { return std::ranges::count(corners, i) > 0; });
-    s.apply(Release{0, all}); // three nodes hold it as well
-    s.apply(SetForce{0, {all.back()}, {0, 0, 1}});
+    s.apply(scene::Release{0, all}); // three nodes hold it as well
+    s.apply(scene::SetForce{0, {all.back()}, {0, 0, 1}});
     s.step(0.01);
     Vec3 sum{0, 0, 1};
-    for (const NodeVector& f : s.contact_forces(0))
+    for (const contact::NodeVector& f : s.contact_forces(0))
       sum += f.value;
     EXPECT_LT(norm(sum), 1e-6);
-    s.apply(Release{0, {corners[2]}}); // now it can turn
+    s.apply(scene::Release{0, {corners[2]}}); // now it can turn
     try {
       s.step(0.01);
       FAIL() << "it moved";
     } catch (const Error& error) {
       EXPECT_NE(std::string(error.what()).find("singular"), std::string::npos) << error.what();
     }
-    s.apply(Release{0, corners}); // and nothing acts on it
-    s.apply(Release{0, all});
+    s.apply(scene::Release{0, corners}); // and nothing acts on it
+    s.apply(scene::Release{0, all});
     s.step(0.01);
     EXPECT_EQ(largest(s.displacement(0)), 0);
   }
@@ -596,34 +602,36 @@ constexpr double weight = 0.3; // g, on each node
 
 TEST(HungMass, IsAWeightThatStaticsAndMotionCarry) {
   for (const bool quadratic : {true, false}) {
-    const Model model = bar(quadratic);
+    const model::Model model = bar(quadratic);
     const std::vector<std::uint32_t> end = end_of(model);
     const Vec3 gravity{0, 0, -100};
-    const auto ready = [&](Method method, bool hung) {
-      auto s = scene(model, method, method == Method::ela ? damped() : SolidChoice());
-      s->apply(SetGravity{gravity});
+    const auto ready = [&](scene::Method method, bool hung) {
+      auto s =
+          scene(model, method, method == scene::Method::ela ? damped() : integrator::SolidChoice());
+      s->apply(scene::SetGravity{gravity});
       if (hung)
-        s->apply(SetMass{0, end, weight});
+        s->apply(scene::SetMass{0, end, weight});
       else
-        s->apply(SetForce{0, end, weight * gravity});
-      if (method == Method::ela)
+        s->apply(scene::SetForce{0, end, weight * gravity});
+      if (method == scene::Method::ela)
         settle(*s);
       else
         s->step(0.01);
       return s;
     };
-    const auto hung = ready(Method::ffe, true), pulled = ready(Method::ffe, false),
-               rests = ready(Method::ela, true), rests_pulled = ready(Method::ela, false);
+    const auto hung = ready(scene::Method::ffe, true), pulled = ready(scene::Method::ffe, false),
+               rests = ready(scene::Method::ela, true),
+               rests_pulled = ready(scene::Method::ela, false);
     const double most = largest(pulled->displacement(0));
     EXPECT_GT(most, 1e-3);
     EXPECT_LT(test::largest_difference(hung->displacement(0), pulled->displacement(0)),
               1e-12 * most);
     EXPECT_LT(test::largest_difference(rests->displacement(0), rests_pulled->displacement(0)),
               1e-4 * most);
-    hung->apply(SetMass{0, end, 0}); // it is taken off
+    hung->apply(scene::SetMass{0, end, 0}); // it is taken off
     hung->step(0.01);
-    const auto alone = scene(model, Method::ffe, {});
-    alone->apply(SetGravity{gravity});
+    const auto alone = scene(model, scene::Method::ffe, {});
+    alone->apply(scene::SetGravity{gravity});
     alone->step(0.01);
     EXPECT_LT(test::largest_difference(hung->displacement(0), alone->displacement(0)),
               1e-12 * most);
@@ -632,53 +640,54 @@ TEST(HungMass, IsAWeightThatStaticsAndMotionCarry) {
 
 /// ELA holds such masses: those of nodes beyond the tetrahedra's.
 TEST(HungMass, InAModelIsTheSame) {
-  const Model model = bar();
-  const auto run = [](const Model& of, bool hangs) {
-    auto s = scene(of, Method::ela, damped());
-    s->apply(SetGravity{{0, 0, -9810}});
+  const model::Model model = bar();
+  const auto run = [](const model::Model& of, bool hangs) {
+    auto s = scene(of, scene::Method::ela, damped());
+    s->apply(scene::SetGravity{{0, 0, -9810}});
     if (hangs)
-      s->apply(SetMass{0, end_of(of), weight});
+      s->apply(scene::SetMass{0, end_of(of), weight});
     for (int k = 0; k < 5; ++k)
       s->step(0.01);
     return s;
   };
   const auto hung = run(model, true);
-  const Model heavier = hung->weighed_model(0);
-  EXPECT_GT(total_mass(heavier), total_mass(model) + 0.99 * weight * 9);
-  EXPECT_EQ(shape(*run(parse_ela(ela_text(heavier), "heavier"), false), 0), shape(*hung, 0));
+  const model::Model heavier = hung->weighed_model(0);
+  EXPECT_GT(model::total_mass(heavier), model::total_mass(model) + 0.99 * weight * 9);
+  EXPECT_EQ(shape(*run(formats::parse_ela(formats::ela_text(heavier), "heavier"), false), 0),
+            shape(*hung, 0));
   EXPECT_GT(test::largest_difference(shape(*run(model, false), 0), shape(*hung, 0)), 0.01);
 }
 
 TEST(HungMass, StaysWhereTheBodyIsCut) {
-  for (const Method method : {Method::ffe, Method::ela}) {
-    const Model model = bar();
+  for (const scene::Method method : {scene::Method::ffe, scene::Method::ela}) {
+    const model::Model model = bar();
     auto s = scene(model, method, damped(), {.guard = true});
-    s->apply(SetMass{0, end_of(model), weight});
-    const double before = total_mass(s->weighed_model(0));
+    s->apply(scene::SetMass{0, end_of(model), weight});
+    const double before = model::total_mass(s->weighed_model(0));
     s->step(0.001);
-    s->apply(CutObject{0, PlaneToCut{{{11, 0, 4}, {1, 0, 0}}, {}, false}});
+    s->apply(scene::CutObject{0, scene::PlaneToCut{{{11, 0, 4}, {1, 0, 0}}, {}, false}});
     ASSERT_EQ(s->object_count(), 2U);
     s->step(0.001);
-    EXPECT_NEAR(total_mass(s->weighed_model(0)) + total_mass(s->weighed_model(1)), before,
-                1e-9 * before);
-    EXPECT_GT(total_mass(s->weighed_model(1)), total_mass(s->model(1)) + weight);
-    EXPECT_EQ(total_mass(s->weighed_model(0)), total_mass(s->model(0)));
+    EXPECT_NEAR(model::total_mass(s->weighed_model(0)) + model::total_mass(s->weighed_model(1)),
+                before, 1e-9 * before);
+    EXPECT_GT(model::total_mass(s->weighed_model(1)), model::total_mass(s->model(1)) + weight);
+    EXPECT_EQ(model::total_mass(s->weighed_model(0)), model::total_mass(s->model(0)));
   }
 }
 
 TEST(HungMass, IsTakenBackWithAStepThatFails) {
-  for (const Method method : {Method::ffe, Method::ela}) {
-    const Model model = bar();
+  for (const scene::Method method : {scene::Method::ffe, scene::Method::ela}) {
+    const model::Model model = bar();
     const std::vector<std::uint32_t> end = end_of(model);
     const auto run = [&](bool fails) {
       auto s = scene(model, method, damped(), {.shapes = true, .guard = true});
-      s->apply(SetGravity{{0, 0, -981}});
+      s->apply(scene::SetGravity{{0, 0, -981}});
       s->step(0.01);
       if (fails) {
-        s->schedule(0.015, SetMass{0, end, weight});
-        s->schedule(0.016, SetForce{0, end, {0, 0, 1e300}});
+        s->schedule(0.015, scene::SetMass{0, end, weight});
+        s->schedule(0.016, scene::SetForce{0, end, {0, 0, 1e300}});
         EXPECT_THROW(s->step(0.01), Error);
-        EXPECT_EQ(total_mass(s->weighed_model(0)), total_mass(s->model(0)));
+        EXPECT_EQ(model::total_mass(s->weighed_model(0)), model::total_mass(s->model(0)));
         return std::vector<double>(shape(*s, 0));
       }
       return std::vector<double>(shape(*s, 0));
@@ -691,32 +700,32 @@ TEST(HungMass, IsTakenBackWithAStepThatFails) {
 /// Measured ones swing at 7.76 Hz without a load and at 4.33 Hz with 52 g: as 24 g on a spring,
 /// which with 102 g more swing at 3.34 Hz.
 TEST(HungMass, ABeamWithAWeightSwingsSlower) {
-  SolidModelOptions options;
+  fem::SolidModelOptions options;
   options.material.materials = {{"silicone", 1.07e-3, 270000, 1, 0.2, 0.499}};
   options.quadratic = true;
-  Model model = solid_model(test::box_tetrahedra(10, 3, 3, 10), options, {});
+  model::Model model = fem::solid_model(test::box_tetrahedra(10, 3, 3, 10), options, {});
   std::vector<std::uint32_t> face;
   for (std::uint32_t i = 0; i < model.nodes.size(); ++i) {
     if (model.nodes[i].position.x == 0)
-      model.nodes[i].fixed = fixed_all;
+      model.nodes[i].fixed = model::fixed_all;
     if (model.nodes[i].position.x == 100)
       face.push_back(i);
   }
-  SolidChoice choice;
-  choice.damping = damping_per_stiffness(0.02, 3.3);
-  const auto s = scene(model, Method::ela, choice);
-  s->apply(SetMass{0, face, 102.0 / static_cast<double>(face.size())});
-  s->apply(SetGravity{{0, 0, -981}}); // a tenth, so that it bends little
+  integrator::SolidChoice choice;
+  choice.damping = integrator::damping_per_stiffness(0.02, 3.3);
+  const auto s = scene(model, scene::Method::ela, choice);
+  s->apply(scene::SetMass{0, face, 102.0 / static_cast<double>(face.size())});
+  s->apply(scene::SetGravity{{0, 0, -981}}); // a tenth, so that it bends little
   std::vector<double> times, down;
   for (int k = 1; k <= 180; ++k) {
     s->step(1.0 / 200);
     times.push_back(s->time());
     down.push_back(s->displacement(0)[3 * std::size_t{face[0]} + 2]);
   }
-  const SwingFit fit = fit_swing(times, down);
+  const fit::SwingFit fit = fit::fit_swing(times, down);
   std::printf("a beam with 102 g swings at %.3f Hz\n", fit.frequency);
   EXPECT_NEAR(fit.frequency, 3.34, 0.02 * 3.34);
 }
 
 } // namespace
-} // namespace gewebe
+} // namespace gewebe::test

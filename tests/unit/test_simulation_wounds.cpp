@@ -26,13 +26,13 @@
 #include <utility>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::test {
 namespace {
 
 using namespace test;
 
 /// By node: the normal at rest that points into the object, as long as the area around.
-std::vector<Vec3> inward_directions(const Model& model) {
+std::vector<Vec3> inward_directions(const model::Model& model) {
   std::vector<Vec3> inward(model.nodes.size());
   for (const Triangle& t : model.triangles) {
     const Vec3 a = model.nodes[t[0]].position, b = model.nodes[t[1]].position,
@@ -44,11 +44,11 @@ std::vector<Vec3> inward_directions(const Model& model) {
 }
 
 /// The two copies of each node of a wound at rest: that on the side of lower x first.
-std::vector<std::array<std::uint32_t, 2>> copies(const Model& model) {
+std::vector<std::array<std::uint32_t, 2>> copies(const model::Model& model) {
   std::map<std::tuple<double, double, double>, std::uint32_t> at;
   std::vector<std::array<std::uint32_t, 2>> all;
   const std::vector<Vec3> inward = inward_directions(model);
-  for (std::uint32_t i = 0; i < surface_count(model); ++i) {
+  for (std::uint32_t i = 0; i < model::surface_count(model); ++i) {
     const Vec3& p = model.nodes[i].position;
     const auto [there, fresh] = at.try_emplace({p.x, p.y, p.z}, i);
     if (fresh)
@@ -60,20 +60,20 @@ std::vector<std::array<std::uint32_t, 2>> copies(const Model& model) {
   return all;
 }
 
-Vec3 place(const Simulation& s, std::size_t object, std::uint32_t node) {
+Vec3 place(const scene::Simulation& s, std::size_t object, std::uint32_t node) {
   return s.model(object).nodes[node].position + vector_at(shape(s, object), node);
 }
 
 /// Pulled (or, below 0, pressed) at its end.
-void pull(Simulation& s, std::size_t object, double force) {
+void pull(scene::Simulation& s, std::size_t object, double force) {
   const std::vector<std::uint32_t> end =
       nodes_where(s.model(object), [](const Vec3& p) { return p.x == 20; });
   for (const std::uint32_t node : end)
-    s.apply(SetForce{object, {node}, {force / static_cast<double>(end.size()), 0, 0}});
+    s.apply(scene::SetForce{object, {node}, {force / static_cast<double>(end.size()), 0, 0}});
 }
 
 /// How far the end has moved along the bar, in the mean.
-double end_moved(const Simulation& s, std::size_t object) {
+double end_moved(const scene::Simulation& s, std::size_t object) {
   const std::vector<double> u = shape(s, object);
   const auto end = nodes_where(s.model(object), [](const Vec3& p) { return p.x == 20; });
   double sum = 0;
@@ -86,8 +86,8 @@ double end_moved(const Simulation& s, std::size_t object) {
 
 enum class Tool { sphere, capsule, mesh };
 
-SetInstrument tool(Tool kind, double friction) {
-  SetInstrument set;
+scene::SetInstrument tool(Tool kind, double friction) {
+  scene::SetInstrument set;
   set.name = "tool";
   set.shape.radius = 0.3; // elements are of 2.5
   set.shape.friction = friction;
@@ -95,15 +95,15 @@ SetInstrument tool(Tool kind, double friction) {
     set.shape.axis = {0, 0, 6};
   if (kind == Tool::mesh) {
     set.shape.radius = 0.05;
-    set.shape.core = std::make_shared<const ConvexCore>(divided_box({0.2, 1.5, 4}, 1));
+    set.shape.core = std::make_shared<const contact::ConvexCore>(divided_box({0.2, 1.5, 4}, 1));
   }
   return set;
 }
 
-void expect_pushed_wall(const Simulation& s, bool sphere, double friction) {
-  const Model& model = s.model(0);
-  const InstrumentReport report = s.instrument(0);
-  const std::vector<NodeVector>& forces = s.contact_forces(0);
+void expect_pushed_wall(const scene::Simulation& s, bool sphere, double friction) {
+  const model::Model& model = s.model(0);
+  const scene::InstrumentReport report = s.instrument(0);
+  const std::vector<contact::NodeVector>& forces = s.contact_forces(0);
   EXPECT_GE(forces.size(), 3U);
   std::vector<std::uint32_t> left;
   for (const auto& pair : copies(model))
@@ -111,7 +111,7 @@ void expect_pushed_wall(const Simulation& s, bool sphere, double friction) {
   const std::vector<Vec3> inward = inward_directions(model);
   Vec3 sum;
   double sizes = 0;
-  for (const NodeVector& f : forces) {
+  for (const contact::NodeVector& f : forces) {
     EXPECT_TRUE(std::ranges::find(left, f.node) != left.end()) << f.node;
     EXPECT_GT(dot(f.value, inward[f.node]), 0) << "it pulls at " << f.node;
     sum += f.value;
@@ -125,10 +125,10 @@ void expect_pushed_wall(const Simulation& s, bool sphere, double friction) {
   }
 }
 
-class ToolsInWounds : public testing::TestWithParam<std::tuple<bool, Method>> {};
+class ToolsInWounds : public testing::TestWithParam<std::tuple<bool, scene::Method>> {};
 INSTANTIATE_TEST_SUITE_P(Solids, ToolsInWounds,
                          testing::Combine(testing::Bool(),
-                                          testing::Values(Method::ffe, Method::ela)));
+                                          testing::Values(scene::Method::ffe, scene::Method::ela)));
 
 TEST_P(ToolsInWounds, PushTheWallThatTheyArePressedOn) {
   const auto [quadratic, method] = GetParam();
@@ -137,11 +137,11 @@ TEST_P(ToolsInWounds, PushTheWallThatTheyArePressedOn) {
       if (quadratic && (kind == Tool::mesh || (kind == Tool::sphere) == (friction == 0)))
         continue;
       SCOPED_TRACE(std::to_string(static_cast<int>(kind)) + " " + std::to_string(friction));
-      Simulation s(one_thread(), {});
+      scene::Simulation s(one_thread(), {});
       s.add_object("bar", bar(quadratic), method);
       s.apply(notch(s.model(0), 9.9));
       pull(s, 0, 5e5);
-      for (int k = 0; k < (method == Method::ela ? 40 : 1); ++k)
+      for (int k = 0; k < (method == scene::Method::ela ? 40 : 1); ++k)
         s.step(1.0 / 60);
       double least = HUGE_VAL;
       Vec3 middle, across;
@@ -153,12 +153,13 @@ TEST_P(ToolsInWounds, PushTheWallThatTheyArePressedOn) {
           middle = place(s, 0, left) + 0.5 * across;
         }
       ASSERT_GT(across.x, 2) << "it opens";
-      SetInstrument set = tool(kind, friction);
+      scene::SetInstrument set = tool(kind, friction);
       set.pose.place = middle + Vec3{0, 0.2, 0};
       s.apply(set);
       s.step(1.0 / 60);
       EXPECT_TRUE(s.contact_forces(0).empty());
-      s.apply(MoveInstrument{0, middle + Vec3{-0.5 * norm(across) - 0.3, 0.4, -0.2}, {}, 0.1});
+      s.apply(
+          scene::MoveInstrument{0, middle + Vec3{-0.5 * norm(across) - 0.3, 0.4, -0.2}, {}, 0.1});
       for (int k = 0; k < 10; ++k)
         s.step(1.0 / 60);
       for (int k = 0; k < 4; ++k) {
@@ -168,11 +169,11 @@ TEST_P(ToolsInWounds, PushTheWallThatTheyArePressedOn) {
       if (kind != Tool::sphere) // which reach out of the wound
         continue;
       // Without the wound it would be inside: it enters from outside, and pushes the surface ahead.
-      s.apply(Restore{0});
+      s.apply(scene::Restore{0});
       for (int k = 0; k < 2; ++k)
         s.step(1.0 / 600);
       Vec3 pushed;
-      for (const NodeVector& f : s.contact_forces(0))
+      for (const contact::NodeVector& f : s.contact_forces(0))
         pushed += f.value;
       EXPECT_GT(norm(pushed), 0);
       EXPECT_LE(norm(pushed + s.instrument(0).force), 1e-9 * norm(pushed));
@@ -182,22 +183,22 @@ TEST_P(ToolsInWounds, PushTheWallThatTheyArePressedOn) {
 // ---- walls
 
 /// A bar as test::bar of larger elements, whose motion comes to rest.
-Model short_bar(bool quadratic) {
-  SolidModelOptions options;
+model::Model short_bar(bool quadratic) {
+  fem::SolidModelOptions options;
   options.material.materials = {{"gel", 1e-3, 20000, 1, 0.2, 0.3}};
   options.quadratic = quadratic;
   options.drag_rate = 40;
-  Model model = solid_model(box_tetrahedra(4, 2, 2, 5), options, {});
-  for (Node& node : model.nodes)
-    node.fixed = node.position.x == 0 ? fixed_all : fixed_none;
+  model::Model model = fem::solid_model(box_tetrahedra(4, 2, 2, 5), options, {});
+  for (model::Node& node : model.nodes)
+    node.fixed = node.position.x == 0 ? model::fixed_all : model::fixed_none;
   return model;
 }
 
-const PlaneToCut slanted{{{9.7, 5, 5}, {1, 0.1, 0.2}}, {}};
+const scene::PlaneToCut slanted{{{9.7, 5, 5}, {1, 0.1, 0.2}}, {}};
 
 /// The least gap of a wound's nodes over the triangles of the other wall, straight.
-double wall_gap(const Simulation& s) {
-  const Model& model = s.model(0);
+double wall_gap(const scene::Simulation& s) {
+  const model::Model& model = s.model(0);
   std::map<std::uint32_t, int> side;
   for (const auto& [left, right] : copies(model)) {
     side[left] = -1;
@@ -221,7 +222,7 @@ double wall_gap(const Simulation& s) {
       const double second = dot(cross(off, c), now) / dot(now, now),
                    third = dot(cross(b, off), now) / dot(now, now);
       if (second >= 0 && third >= 0 && second + third <= 1)
-        least = smaller(least, dot(off, now) / norm(now));
+        least = numeric::smaller(least, dot(off, now) / norm(now));
     }
   }
   return least / 5;
@@ -233,12 +234,12 @@ INSTANTIATE_TEST_SUITE_P(Orders, Wounds, testing::Bool());
 TEST_P(Wounds, HalvesThatArePressedTogetherDoNotPass) {
   double whole = 0;
   for (const std::string how : {"whole", "touch", "pass"}) {
-    Simulation s(one_thread(), {});
-    s.add_object("bar", short_bar(GetParam()), Method::ela);
+    scene::Simulation s(one_thread(), {});
+    s.add_object("bar", short_bar(GetParam()), scene::Method::ela);
     if (how == "touch")
-      s.apply(SetContact{0, 0, 0.8});
+      s.apply(scene::SetContact{0, 0, 0.8});
     if (how != "whole")
-      s.apply(CutObject{0, slanted});
+      s.apply(scene::CutObject{0, slanted});
     const std::size_t last = s.object_count() - 1;
     ASSERT_EQ(last, how == "whole" ? 0U : 1U);
     pull(s, last, -1e5);
@@ -264,22 +265,22 @@ TEST_P(Wounds, HalvesThatArePressedTogetherDoNotPass) {
 
 TEST_P(Wounds, WhatComesOffFallsOnWhatItsParentTouched) {
   for (const bool meets : {true, false}) {
-    Simulation s(one_thread(), {});
-    s.add_object("bar", short_bar(GetParam()), Method::ela);
-    SolidModelOptions options;
+    scene::Simulation s(one_thread(), {});
+    s.add_object("bar", short_bar(GetParam()), scene::Method::ela);
+    fem::SolidModelOptions options;
     options.material.materials = {{"gel", 1e-3, 2e4, 1, 0.2, 0.3}};
     options.quadratic = GetParam();
-    Model plate = solid_model(box_tetrahedra(4, 3, 1, 7), options, {});
-    for (Node& node : plate.nodes) {
-      node.fixed = node.position.z == 0 ? fixed_all : fixed_none;
+    model::Model plate = fem::solid_model(box_tetrahedra(4, 3, 1, 7), options, {});
+    for (model::Node& node : plate.nodes) {
+      node.fixed = node.position.z == 0 ? model::fixed_all : model::fixed_none;
       node.position += Vec3{-1, -6, -9};
     }
-    s.add_object("plate", plate, Method::ela);
-    s.apply(SetGravity{{0, 0, -9810}});
+    s.add_object("plate", plate, scene::Method::ela);
+    s.apply(scene::SetGravity{{0, 0, -9810}});
     if (meets)
-      s.apply(SetContact{0, 1, 0.8});
+      s.apply(scene::SetContact{0, 1, 0.8});
     s.step(0.01);
-    s.apply(CutObject{0, slanted});
+    s.apply(scene::CutObject{0, slanted});
     ASSERT_EQ(s.object_count(), 3U);
     double up = 0;
     for (int k = 0; k < 24; ++k) {
@@ -302,14 +303,14 @@ TEST_P(Wounds, WhatComesOffFallsOnWhatItsParentTouched) {
 TEST(WoundScenes, ItsWallsDoNotPass) {
   double whole = 0;
   for (const std::string how : {"whole", "touch", "pass"}) {
-    Simulation s(one_thread(), {});
-    s.add_object("bar", short_bar(false), Method::ela);
+    scene::Simulation s(one_thread(), {});
+    s.add_object("bar", short_bar(false), scene::Method::ela);
     if (how == "touch")
-      s.apply(SetContact{0, 0, 0.8});
+      s.apply(scene::SetContact{0, 0, 0.8});
     if (how != "whole")
-      s.apply(CutObject{0, PlaneToCut{slanted.plane, nodes_where(s.model(0), [](const Vec3& p) {
-                                        return p.z > 2;
-                                      })}});
+      s.apply(scene::CutObject{
+          0, scene::PlaneToCut{slanted.plane,
+                               nodes_where(s.model(0), [](const Vec3& p) { return p.z > 2; })}});
     ASSERT_EQ(s.object_count(), 1U);
     pull(s, 0, -1e5);
     for (int k = 0; k < 10; ++k)
@@ -330,17 +331,18 @@ TEST(WoundScenes, ItsWallsDoNotPass) {
 /// Contact that is asked for after the cut, whose walls stand at one place then; they part by less
 /// than a thousandth of an edge.
 TEST(WoundScenes, WallsOfACutMadeBeforeContactBeginApart) {
-  for (const Method method : {Method::ela, Method::ffe})
+  for (const scene::Method method : {scene::Method::ela, scene::Method::ffe})
     for (const bool through : {false, true}) {
-      Simulation s(one_thread(), {});
+      scene::Simulation s(one_thread(), {});
       s.add_object("bar", short_bar(false), method);
-      s.apply(CutObject{
+      s.apply(scene::CutObject{
           0, through ? slanted
-                     : PlaneToCut{slanted.plane,
-                                  nodes_where(s.model(0), [](const Vec3& p) { return p.z > 2; })}});
+                     : scene::PlaneToCut{slanted.plane, nodes_where(s.model(0), [](const Vec3& p) {
+                                           return p.z > 2;
+                                         })}});
       const std::size_t last = s.object_count() - 1;
       ASSERT_EQ(last, through ? 1U : 0U);
-      s.apply(SetContact{0, last, 0.8});
+      s.apply(scene::SetContact{0, last, 0.8});
       pull(s, last, -1e4);
       for (int k = 0; k < 5; ++k) {
         s.step(1.0 / 60);
@@ -351,7 +353,7 @@ TEST(WoundScenes, WallsOfACutMadeBeforeContactBeginApart) {
         }
       }
       EXPECT_FALSE(s.contact_forces(0).empty());
-      if (through && method == Method::ela) { // else one tells means over its step
+      if (through && method == scene::Method::ela) { // else one tells means over its step
         EXPECT_LE(norm(sum_of_forces(s, 0) + sum_of_forces(s, 1)),
                   1e-11 * norm(sum_of_forces(s, 0)));
       }
@@ -361,24 +363,24 @@ TEST(WoundScenes, WallsOfACutMadeBeforeContactBeginApart) {
 /// Rounding puts the middles of edges of both sides of a cut at places that differ by a bit, where
 /// the body has been bent.
 TEST(WoundScenes, WallsOfAMovedQuadraticSolidBeginApart) {
-  TetMesh mesh = box_tetrahedra(4, 2, 2, 5);
+  tetrahedra::TetMesh mesh = box_tetrahedra(4, 2, 2, 5);
   for (Vec3& p : mesh.points) { // turned, so that no coordinate is a round number
     p = {0.8 * p.x - 0.6 * p.y, 0.6 * p.x + 0.8 * p.y, p.z};
     p = {p.x + 0.1, 0.28 * p.y - 0.96 * p.z, 0.96 * p.y + 0.28 * p.z};
   }
-  SolidModelOptions options;
+  fem::SolidModelOptions options;
   options.material.materials = {{"gel", 1e-3, 20000, 1, 0.2, 0.3}};
   options.quadratic = true;
-  Simulation s(one_thread(), {});
-  s.add_object("bar", solid_model(mesh, options, {}), Method::ela);
-  s.apply(SetContact{0, 0, 0.3});
-  s.apply(SetForce{0, {0}, {7e3, -2e3, 1e3}});
+  scene::Simulation s(one_thread(), {});
+  s.add_object("bar", fem::solid_model(mesh, options, {}), scene::Method::ela);
+  s.apply(scene::SetContact{0, 0, 0.3});
+  s.apply(scene::SetForce{0, {0}, {7e3, -2e3, 1e3}});
   for (int k = 0; k < 3; ++k)
     s.step(1.0 / 60);
   Vec3 middle;
-  for (const Node& node : s.model(0).nodes)
+  for (const model::Node& node : s.model(0).nodes)
     middle += node.position / static_cast<double>(s.model(0).nodes.size());
-  s.apply(CutObject{0, PlaneToCut{{middle, {0.93, -0.31, 0.47}}, {}}});
+  s.apply(scene::CutObject{0, scene::PlaneToCut{{middle, {0.93, -0.31, 0.47}}, {}}});
   for (int k = 0; k < 3; ++k)
     s.step(1.0 / 60);
   ASSERT_EQ(s.object_count(), 2U);
@@ -387,14 +389,14 @@ TEST(WoundScenes, WallsOfAMovedQuadraticSolidBeginApart) {
 
 TEST(WoundScenes, WhatComesOffLiesOnItsParent) {
   for (const bool meets : {true, false}) {
-    Simulation s(one_thread(), {});
-    Model held = block(3, 3, 3, {}, true);
+    scene::Simulation s(one_thread(), {});
+    model::Model held = block(3, 3, 3, {}, true);
     add(s, "block", held);
-    s.apply(SetGravity{{0, 0, -9810}});
+    s.apply(scene::SetGravity{{0, 0, -9810}});
     if (meets)
-      s.apply(SetContact{0, 0, 0.5});
+      s.apply(scene::SetContact{0, 0, 0.5});
     s.step(0.01);
-    s.apply(CutObject{0, PlaneToCut{{{0, 0, 6.6}, {0.05, 0.02, 1}}, {}}});
+    s.apply(scene::CutObject{0, scene::PlaneToCut{{{0, 0, 6.6}, {0.05, 0.02, 1}}, {}}});
     ASSERT_EQ(s.object_count(), 2U);
     for (int k = 0; k < 10; ++k) {
       s.step(1.0 / 60);
@@ -414,17 +416,17 @@ TEST(WoundScenes, WhatComesOffLiesOnItsParent) {
 
 /// The part of an elastostatic object moves, and may touch what moves.
 TEST(WoundScenes, WhatComesOffAnElastostaticObjectMayTouchWhatMoves) {
-  Simulation s(one_thread(), {});
-  s.add_object("bar", short_bar(false), Method::ffe);
-  Model plate = block(8, 6, 1, {-4, -7, -9});
-  for (Node& node : plate.nodes)
-    node.fixed = node.position.z == -9 ? fixed_all : fixed_none;
+  scene::Simulation s(one_thread(), {});
+  s.add_object("bar", short_bar(false), scene::Method::ffe);
+  model::Model plate = block(8, 6, 1, {-4, -7, -9});
+  for (model::Node& node : plate.nodes)
+    node.fixed = node.position.z == -9 ? model::fixed_all : model::fixed_none;
   add(s, "plate", plate);
-  s.apply(SetGravity{{0, 0, -9810}});
+  s.apply(scene::SetGravity{{0, 0, -9810}});
   s.step(0.01);
-  s.apply(CutObject{0, slanted});
+  s.apply(scene::CutObject{0, slanted});
   ASSERT_EQ(s.object_count(), 3U);
-  s.apply(SetContact{2, 1, 0.8});
+  s.apply(scene::SetContact{2, 1, 0.8});
   for (int k = 0; k < 16; ++k) {
     s.step(1.0 / 60);
     EXPECT_GT(least_gap(s, 1, 2), 0);
@@ -433,19 +435,20 @@ TEST(WoundScenes, WhatComesOffAnElastostaticObjectMayTouchWhatMoves) {
 }
 
 TEST(WoundScenes, RestoreTakesTheWallsOutOfContact) {
-  Simulation s(one_thread(), {}), never(one_thread(), {});
-  for (Simulation* const one : {&s, &never}) {
-    one->add_object("bar", short_bar(false), Method::ela);
-    one->apply(SetContact{0, 0, 0.3});
+  scene::Simulation s(one_thread(), {}), never(one_thread(), {});
+  for (scene::Simulation* const one : {&s, &never}) {
+    one->add_object("bar", short_bar(false), scene::Method::ela);
+    one->apply(scene::SetContact{0, 0, 0.3});
     pull(*one, 0, -1e5);
     one->step(1.0 / 60);
   }
-  s.apply(CutObject{0, PlaneToCut{slanted.plane,
-                                  nodes_where(s.model(0), [](const Vec3& p) { return p.z > 2; })}});
+  s.apply(scene::CutObject{
+      0, scene::PlaneToCut{slanted.plane,
+                           nodes_where(s.model(0), [](const Vec3& p) { return p.z > 2; })}});
   for (int k = 0; k < 4; ++k)
     s.step(1.0 / 60);
   EXPECT_FALSE(s.contact_forces(0).empty());
-  s.apply(Restore{0});
+  s.apply(scene::Restore{0});
   EXPECT_EQ(s.model(0), never.model(0));
   for (int k = 0; k < 20; ++k)
     s.step(1.0 / 60);
@@ -457,14 +460,15 @@ TEST(WoundScenes, RestoreTakesTheWallsOutOfContact) {
 
 TEST(WoundScenes, AStepThatFailsLeavesTheSurfaceThatTouches) {
   const auto run = [](bool fails) {
-    Simulation s(one_thread(), {.guard = true});
+    scene::Simulation s(one_thread(), {.guard = true});
     add(s, "block", block(3, 3, 3, {}, true));
-    s.apply(SetGravity{{0, 0, -9810}});
-    s.apply(SetContact{0, 0, 0.5});
+    s.apply(scene::SetGravity{{0, 0, -9810}});
+    s.apply(scene::SetContact{0, 0, 0.5});
     s.step(0.01);
     if (fails) {
-      s.schedule(0.015, CutObject{0, PlaneToCut{{{0, 0, 6.6}, {0.05, 0.02, 1}}, {}}});
-      s.schedule(0.018, CutObject{0, PlaneToCut{{{0, 0, 500}, {0, 0, 1}}, {}}}); // misses
+      s.schedule(0.015, scene::CutObject{0, scene::PlaneToCut{{{0, 0, 6.6}, {0.05, 0.02, 1}}, {}}});
+      s.schedule(0.018,
+                 scene::CutObject{0, scene::PlaneToCut{{{0, 0, 500}, {0, 0, 1}}, {}}}); // misses
       EXPECT_THROW(s.step(0.01), Error);
       EXPECT_EQ(s.object_count(), 1U);
     }
@@ -475,9 +479,9 @@ TEST(WoundScenes, AStepThatFailsLeavesTheSurfaceThatTouches) {
   const std::vector<double> once = run(false), again = run(true);
   double most = 0;
   for (std::size_t k = 0; k < once.size(); ++k)
-    most = larger(most, std::abs(once[k] - again[k]));
+    most = numeric::larger(most, std::abs(once[k] - again[k]));
   EXPECT_LE(most, 1e-3 * block_edge); // what was learned is forgotten
 }
 
 } // namespace
-} // namespace gewebe
+} // namespace gewebe::test

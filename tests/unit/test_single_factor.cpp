@@ -13,20 +13,20 @@
 #include <random>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::test {
 namespace {
 
 TEST(SingleFactor, SolvesAsTheFactorDoesWithTheSameBytesEverywhere) {
   for (const unsigned n : {1U, 4U, 9U}) {
-    const TetMesh mesh = test::box_tetrahedra(n, n, n + 3, 2);
-    const std::vector<SolidElement> elements =
-        solid_elements(mesh, std::vector<SolidMaterial>{{2500, 0.3, 1e-3}});
+    const tetrahedra::TetMesh mesh = test::box_tetrahedra(n, n, n + 3, 2);
+    const std::vector<fem::SolidElement> elements =
+        fem::solid_elements(mesh, std::vector<fem::SolidMaterial>{{2500, 0.3, 1e-3}});
     std::vector<std::uint8_t> fixed(3 * mesh.points.size());
     fixed[0] = fixed[1] = fixed[2] = fixed[5] = 1;
-    StiffnessMatrix k = solid_stiffness(mesh, elements, fixed);
+    linalg::StiffnessMatrix k = fem::solid_stiffness(mesh, elements, fixed);
     for (std::size_t c = 0; c < k.order(); ++c)
       k.value[static_cast<std::size_t>(k.column_start[c])] += 3000;
-    const Factor factor(k, {});
+    const linalg::Factor factor(k, {});
     std::mt19937 random(n);
     std::uniform_real_distribution<double> value(-1, 1);
     std::vector<double> f(k.order()), exact(k.order());
@@ -37,7 +37,7 @@ TEST(SingleFactor, SolvesAsTheFactorDoesWithTheSameBytesEverywhere) {
       Context context;
       context.threads = threads;
       context.cpu = cpu;
-      SingleFactor single(factor);
+      linalg::SingleFactor single(factor);
       std::vector<double> x = f;
       single.solve(x, context);
       x = f; // again, for nothing of the first time may be left
@@ -53,7 +53,7 @@ TEST(SingleFactor, SolvesAsTheFactorDoesWithTheSameBytesEverywhere) {
     EXPECT_LT(off, 1e-4 * whole);
     // Entries have 16 bits: what is left over is solved as well.
     std::vector<double> left(x.size());
-    SingleFactor single(factor);
+    linalg::SingleFactor single(factor);
     std::vector<double> better = x;
     for (int round = 0; round < 3; ++round) {
       left = f;
@@ -80,4 +80,4 @@ TEST(SingleFactor, SolvesAsTheFactorDoesWithTheSameBytesEverywhere) {
 }
 
 } // namespace
-} // namespace gewebe
+} // namespace gewebe::test

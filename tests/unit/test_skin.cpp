@@ -21,17 +21,17 @@
 #include <string>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::test {
 namespace {
 
 /// A box 2 × 2 × 2 whose inner nodes stand anywhere, of two materials.
-Model box_model(bool quadratic) {
-  TetMesh mesh = test::distorted_box();
-  SolidModelOptions options;
+model::Model box_model(bool quadratic) {
+  tetrahedra::TetMesh mesh = test::distorted_box();
+  fem::SolidModelOptions options;
   options.material.materials = {{"gel", 1.1e-3, 5000, 1, 0.2, 0.4},
                                 {"stone", 2e-3, 20000, 1, 0.2, 0.2}};
   options.quadratic = quadratic;
-  return solid_model(std::move(mesh), options, {});
+  return fem::solid_model(std::move(mesh), options, {});
 }
 
 /// A ball about the box's middle with texture coordinates: of radius 0.8 inside it, of 1.3 in and
@@ -44,9 +44,9 @@ TriangleMesh textured_ball(double radius) {
 }
 
 template <class Field>
-std::vector<double> displacement(const Model& model, const Field& field) {
+std::vector<double> displacement(const model::Model& model, const Field& field) {
   std::vector<double> u;
-  for (const Node& node : model.nodes) {
+  for (const model::Node& node : model.nodes) {
     const Vec3 at = field(node.position);
     u.insert(u.end(), {at.x, at.y, at.z});
   }
@@ -62,11 +62,11 @@ Vec3 bent(const Vec3& p) {
 
 /// The largest distance of the displaced skin from its points displaced by `field`.
 template <class Field>
-double error_of(Model& model, const TriangleMesh& surface, const Field& field) {
-  (void)add_skin(model, surface, {}, {});
-  check_model(model);
-  const std::vector<Vec3> moved =
-      displaced_skin(skin_weights(model), model.skin.points, displacement(model, field));
+double error_of(model::Model& model, const TriangleMesh& surface, const Field& field) {
+  (void)embedding::add_skin(model, surface, {}, {});
+  model::check_model(model);
+  const std::vector<Vec3> moved = embedding::displaced_skin(
+      embedding::skin_weights(model), model.skin.points, displacement(model, field));
   double most = 0;
   for (std::size_t p = 0; p < moved.size(); ++p)
     most = test::larger(most, norm(moved[p] - model.skin.points[p] - field(model.skin.points[p])));
@@ -79,7 +79,7 @@ bool inside(const Vec3& p) {
 
 TEST(Skin, FollowsWhatElementsHoldExactly) {
   for (const bool quadratic : {false, true}) {
-    Model model = box_model(quadratic);
+    model::Model model = box_model(quadratic);
     EXPECT_LT(error_of(model, textured_ball(0.8), affine), 1e-13) << quadratic;
     EXPECT_LT(error_of(model, textured_ball(1.3), affine), 1e-12) << quadratic; // outside too
     if (quadratic)
@@ -90,15 +90,15 @@ TEST(Skin, FollowsWhatElementsHoldExactly) {
 }
 
 TEST(Skin, GoesOnOutsideWithTheStrainThatItLeft) {
-  Model model = box_model(true);
+  model::Model model = box_model(true);
   TriangleMesh surface;
   surface.points = {{1.2, 0.9, 3.5}, {4, 1.1, 0.7}, {-3, -2, 1.4}};
   surface.triangles = {{0, 1, 2}};
-  const SkinReport report = add_skin(model, surface, {}, {});
+  const embedding::SkinReport report = embedding::add_skin(model, surface, {}, {});
   EXPECT_EQ(report.points_outside, 3U);
   EXPECT_NEAR(report.farthest, std::sqrt(13.0), 1e-12);
-  const std::vector<Vec3> moved =
-      displaced_skin(skin_weights(model), model.skin.points, displacement(model, bent));
+  const std::vector<Vec3> moved = embedding::displaced_skin(
+      embedding::skin_weights(model), model.skin.points, displacement(model, bent));
   for (std::size_t p = 0; p < moved.size(); ++p) {
     const Vec3 x = surface.points[p];
     Vec3 q = x; // the nearest point of the box
@@ -113,9 +113,9 @@ TEST(Skin, GoesOnOutsideWithTheStrainThatItLeft) {
 
 TEST(Skin, PointsFollowTheNearestElementOfAll) {
   for (const double radius : {0.8, 1.3, 9.0}) {
-    Model model = box_model(false);
+    model::Model model = box_model(false);
     const TriangleMesh surface = textured_ball(radius);
-    const SkinReport report = add_skin(model, surface, {}, {});
+    const embedding::SkinReport report = embedding::add_skin(model, surface, {}, {});
     ASSERT_EQ(model.skin.points, surface.points);
     EXPECT_EQ(model.skin.triangles, surface.triangles);
     std::uint64_t outside = 0;
@@ -131,11 +131,13 @@ TEST(Skin, PointsFollowTheNearestElementOfAll) {
       std::array<Vec3, 4> c;
       for (std::size_t a = 0; a < 4; ++a)
         c[a] = model.nodes[t[a]].position;
-      const double whole = tetrahedron_volume(c[0], c[1], c[2], c[3]);
+      const double whole = tetrahedra::tetrahedron_volume(c[0], c[1], c[2], c[3]);
       for (std::size_t a = 0; a < 4; ++a) {
         std::array<Vec3, 4> with = c;
         with[a] = x - away;
-        EXPECT_GE(tetrahedron_volume(with[0], with[1], with[2], with[3]) / whole, -1e-12) << p;
+        EXPECT_GE(tetrahedra::tetrahedron_volume(with[0], with[1], with[2], with[3]) / whole,
+                  -1e-12)
+            << p;
       }
     }
     EXPECT_EQ(report.points_outside, outside);
@@ -144,33 +146,33 @@ TEST(Skin, PointsFollowTheNearestElementOfAll) {
 }
 
 TEST(Skin, FindsTheNearestElementAcrossAHollow) {
-  TetMesh mesh = test::box_tetrahedra(9, 9, 9);
+  tetrahedra::TetMesh mesh = test::box_tetrahedra(9, 9, 9);
   std::erase_if(mesh.tetrahedra, [&](const Tetrahedron& t) {
     Vec3 sum;
     for (const std::uint32_t corner : t)
       sum += mesh.points[corner];
     return norm(sum / 4 - Vec3{4.6, 4.4, 4.5}) < 3.3;
   });
-  const TriangleMesh walls = boundary(mesh).mesh;
-  SolidModelOptions options;
+  const TriangleMesh walls = tetrahedra::boundary(mesh).mesh;
+  fem::SolidModelOptions options;
   options.material.materials[0].poisson = 0.3;
   options.quadratic = false;
-  Model model = solid_model(std::move(mesh), options, {});
+  model::Model model = fem::solid_model(std::move(mesh), options, {});
   const TriangleMesh surface = test::ball(2, 1.7, {4.9, 4.2, 4.5});
-  const SkinReport report = add_skin(model, surface, {}, {});
+  const embedding::SkinReport report = embedding::add_skin(model, surface, {}, {});
   EXPECT_EQ(report.points_outside, surface.points.size());
-  const SkinWeights weights = skin_weights(model);
+  const embedding::SkinWeights weights = embedding::skin_weights(model);
   double farthest = 0;
   for (std::size_t p = 0; p < surface.points.size(); ++p) {
     const Vec3& x = surface.points[p];
     const auto away = [&](const std::array<Vec3, 3>& c) {
-      return norm(x - nearest_on_triangle(x, c[0], c[1], c[2]).point);
+      return norm(x - mesh::nearest_on_triangle(x, c[0], c[1], c[2]).point);
     };
     double all = HUGE_VAL, own = HUGE_VAL;
     for (const auto& [a, b, c] : walls.triangles)
       all = test::smaller(all, away({walls.points[a], walls.points[b], walls.points[c]}));
     const std::uint32_t* const node = &weights.node[4 * p];
-    for (const auto& [a, b, c] : tetrahedron_faces)
+    for (const auto& [a, b, c] : tetrahedra::tetrahedron_faces)
       own = test::smaller(own, away({model.nodes[node[a]].position, model.nodes[node[b]].position,
                                      model.nodes[node[c]].position}));
     EXPECT_EQ(own, all) << p;
@@ -180,46 +182,46 @@ TEST(Skin, FindsTheNearestElementAcrossAHollow) {
 }
 
 TEST(Skin, IsTheSameOnAnyNumberOfThreads) {
-  Model one = box_model(true), four = one;
+  model::Model one = box_model(true), four = one;
   Context context;
   context.threads = 1;
-  (void)add_skin(one, textured_ball(1.3), {}, context);
+  (void)embedding::add_skin(one, textured_ball(1.3), {}, context);
   context.threads = 4;
-  (void)add_skin(four, textured_ball(1.3), {}, context);
+  (void)embedding::add_skin(four, textured_ball(1.3), {}, context);
   EXPECT_EQ(one, four);
 }
 
 TEST(Skin, LeavesOutWhatIsNoSurface) {
-  Model model = box_model(false);
+  model::Model model = box_model(false);
   TriangleMesh surface;
   surface.points = {{9, 9, 9}, {0, 0, 0}, {1, 0, 0}, {0, 1, 0}};
   surface.triangles = {{1, 1, 2}, {1, 2, 3}};
   surface.texcoords = {{1, 1, 1, 1, 1, 1}, {0, 0.1F, 1, 0, 0, 1}};
   const std::vector<std::int32_t> material{0, 1};
-  EXPECT_EQ(add_skin(model, surface, material, {}).dropped_triangles, 1U);
+  EXPECT_EQ(embedding::add_skin(model, surface, material, {}).dropped_triangles, 1U);
   EXPECT_EQ(model.skin.points.size(), 3U);
   EXPECT_EQ(model.skin.triangles, (std::vector<Triangle>{{0, 1, 2}}));
   EXPECT_EQ(model.skin.material, (std::vector<std::int32_t>{1}));
   EXPECT_EQ(model.skin.texcoords[0][1], 0.1);
   surface.triangles.resize(1);
   surface.texcoords.resize(1);
-  EXPECT_THROW(add_skin(model, surface, {}, {}), Error);
+  EXPECT_THROW(embedding::add_skin(model, surface, {}, {}), Error);
 }
 
 TEST(Skin, IsReadAsItIsWritten) {
-  Model model = box_model(true);
-  const std::string bare = model_digest(model);
+  model::Model model = box_model(true);
+  const std::string bare = model::model_digest(model);
   TriangleMesh surface = textured_ball(1.3);
   const std::vector<std::int32_t> material(surface.triangles.size(), 1);
-  (void)add_skin(model, surface, material, {});
-  EXPECT_NE(model_digest(model), bare);
-  EXPECT_EQ(parse_ela(ela_text(model), "M"), model);
-  const TriangleMesh shown = shown_mesh(model);
+  (void)embedding::add_skin(model, surface, material, {});
+  EXPECT_NE(model::model_digest(model), bare);
+  EXPECT_EQ(formats::parse_ela(formats::ela_text(model), "M"), model);
+  const TriangleMesh shown = model::shown_mesh(model);
   EXPECT_EQ(shown.points, surface.points);
   EXPECT_EQ(shown.texcoords, surface.texcoords);
   EXPECT_EQ(shown.material, material);
   model.skin.texcoords.clear();
-  EXPECT_EQ(parse_ela(ela_text(model), "M"), model);
+  EXPECT_EQ(formats::parse_ela(formats::ela_text(model), "M"), model);
 }
 
 TEST(Skin, IsCheckedLineByLine) {
@@ -230,7 +232,7 @@ TEST(Skin, IsCheckedLineByLine) {
   const std::string skin = "skin 3\n0 0 0 0\n1 0 0 0\n0 1 0 0\nskin_triangles 1\n0 1 2 0\n"
                            "skin_texcoords 1\n0 0 1 0 0 1\n";
   const auto complaint = [&](const std::string& text) {
-    const std::string said = test::complaint([&] { return parse_ela(text, "M"); });
+    const std::string said = test::complaint([&] { return formats::parse_ela(text, "M"); });
     return said.empty() ? said : said.substr(2);
   };
   EXPECT_EQ(complaint(head + elements + skin + "end\n"), "");
@@ -265,4 +267,4 @@ TEST(Skin, IsCheckedLineByLine) {
 }
 
 } // namespace
-} // namespace gewebe
+} // namespace gewebe::test

@@ -14,7 +14,7 @@
 #include <string>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::test {
 namespace {
 
 using namespace scenes;
@@ -25,7 +25,7 @@ Context with_threads(int threads) {
   return context;
 }
 
-using Place = SnapOptions::Place;
+using Place = surface::SnapOptions::Place;
 
 /// All that merge_snap_clusters tells, in an order of its own.
 struct Outcome {
@@ -41,23 +41,23 @@ struct Outcome {
   }
 };
 
-SnapLattice lattice_of(const IsoSurface& surface, double epsilon) {
-  return SnapLattice({}, *surface.lattice, epsilon, surface.transform.determinant() < 0);
+surface::SnapLattice lattice_of(const surface::IsoSurface& surface, double epsilon) {
+  return surface::SnapLattice({}, *surface.lattice, epsilon, surface.transform.determinant() < 0);
 }
 
-Outcome merge(const IsoSurface& surface, double epsilon, Place place, int threads,
+Outcome merge(const surface::IsoSurface& surface, double epsilon, Place place, int threads,
               bool always_careful) {
-  SnapLattice lattice = lattice_of(surface, epsilon);
-  const SnapMerges merges =
-      merge_snap_clusters(with_threads(threads), lattice, place, always_careful);
+  surface::SnapLattice lattice = lattice_of(surface, epsilon);
+  const surface::SnapMerges merges =
+      surface::merge_snap_clusters(with_threads(threads), lattice, place, always_careful);
   Outcome result{
       {}, {}, merges.dropped, merges.clusters, merges.corners, merges.refused, merges.careful};
   for (const auto& part : merges.places)
-    for (const SnapMerges::Place& p : part)
+    for (const surface::SnapMerges::Place& p : part)
       result.places[p.point] = {p.position.x, p.position.y, p.position.z};
   for (std::size_t n = 0; n < surface.lattice->blocks.size(); ++n)
     for (std::size_t w = 0; w < 24; ++w) {
-      result.marked += count_bits(lattice.snaps(n).looked_at[w]);
+      result.marked += surface::count_bits(lattice.snaps(n).looked_at[w]);
       for (std::uint64_t bits = lattice.snaps(n).merged[w]; bits != 0; bits &= bits - 1) {
         const std::uint32_t p =
             lattice.block(n).point(w, static_cast<unsigned>(std::countr_zero(bits)));
@@ -71,8 +71,8 @@ struct Compared {
   std::size_t clusters = 0, careful = 0;
 };
 
-Compared compare(const Grid& grid, double epsilon, const std::string& name) {
-  const IsoSurface surface = marching_cubes_to_snap({}, grid);
+Compared compare(const volume::Grid& grid, double epsilon, const std::string& name) {
+  const surface::IsoSurface surface = surface::marching_cubes_to_snap({}, grid);
   const Place place = name.size() % 2 == 0 ? Place::mean : Place::corner;
   const Outcome fast = merge(surface, epsilon, place, 2, false),
                 slow = merge(surface, epsilon, place, 1, true);
@@ -103,10 +103,11 @@ TEST(SnapCollapse, ParallelClustersEndAsInOrder) {
 
 TEST(SnapCollapse, ThreadsGiveEqualBytes) {
   for (const double epsilon : {0.0, 0.15, 0.5}) {
-    const IsoSurface surface = marching_cubes(with_threads(1), metaballs(64, 3));
-    const SnapResult one = snap(with_threads(1), surface, {.epsilon = epsilon});
+    const surface::IsoSurface surface = surface::marching_cubes(with_threads(1), metaballs(64, 3));
+    const surface::SnapResult one = surface::snap(with_threads(1), surface, {.epsilon = epsilon});
     for (const int threads : {2, 3, 7}) {
-      const SnapResult more = snap(with_threads(threads), surface, {.epsilon = epsilon});
+      const surface::SnapResult more =
+          surface::snap(with_threads(threads), surface, {.epsilon = epsilon});
       EXPECT_EQ(one.mesh.points, more.mesh.points);
       EXPECT_EQ(one.mesh.triangles, more.mesh.triangles);
     }
@@ -115,7 +116,7 @@ TEST(SnapCollapse, ThreadsGiveEqualBytes) {
 
 TEST(SnapCollapse, AnotherOutcomeIsSeen) {
   // Negative control of the comparison: each thing told counts.
-  const IsoSurface surface = marching_cubes_to_snap({}, metaballs(24, 3));
+  const surface::IsoSurface surface = surface::marching_cubes_to_snap({}, metaballs(24, 3));
   const Outcome outcome = merge(surface, 0.3, Place::mean, 1, false);
   ASSERT_FALSE(outcome.targets.empty());
   EXPECT_TRUE(outcome.ends_as(merge(surface, 0.3, Place::mean, 1, true)));
@@ -132,31 +133,32 @@ TEST(SnapCollapse, AnotherOutcomeIsSeen) {
   EXPECT_FALSE(outcome.ends_as(other));
 }
 
-Int3 corner_of(const EdgeCrossing& crossing, double epsilon) {
+Int3 corner_of(const surface::EdgeCrossing& crossing, double epsilon) {
   Int3 corner = crossing.corner;
   if (!(crossing.fraction <= epsilon))
     ++corner[static_cast<std::size_t>(crossing.axis)];
   return corner;
 }
 
-bool snaps(const EdgeCrossing& crossing, double epsilon) {
+bool snaps(const surface::EdgeCrossing& crossing, double epsilon) {
   return crossing.fraction <= epsilon || 1 - crossing.fraction <= epsilon;
 }
 
 TEST(SnapLattice, CornersAreThoseOfAPlainSearch) {
   constexpr double epsilon = 0.3;
   for (std::uint32_t seed = 0; seed < 20; ++seed) {
-    const IsoSurface surface = marching_cubes_to_snap({}, noise(14, seed, seed % 3 == 0 ? 4 : 0));
-    const std::vector<EdgeCrossing> crossings = edge_crossings(surface);
-    const SnapLattice lattice = lattice_of(surface, epsilon);
+    const surface::IsoSurface surface =
+        surface::marching_cubes_to_snap({}, noise(14, seed, seed % 3 == 0 ? 4 : 0));
+    const std::vector<surface::EdgeCrossing> crossings = surface::edge_crossings(surface);
+    const surface::SnapLattice lattice = lattice_of(surface, epsilon);
     std::map<Int3, std::vector<std::uint32_t>> corners;
     for (std::uint32_t p = 0; p < crossings.size(); ++p)
       if (snaps(crossings[p], epsilon))
         corners[corner_of(crossings[p], epsilon)].push_back(p);
     std::size_t some = 0;
     for (std::size_t n = 0; n < lattice.count(); ++n) {
-      const SnapLattice::Corners drawn = lattice.corners(n);
-      for (int bit = 0; bit < leaf_voxels; ++bit) {
+      const surface::SnapLattice::Corners drawn = lattice.corners(n);
+      for (int bit = 0; bit < volume::leaf_voxels; ++bit) {
         const Int3 corner{bit >> 6, bit >> 3 & 7, bit & 7};
         const auto found = corners.find(lattice.absolute(n, corner));
         const auto slice = static_cast<std::size_t>(corner[0]);
@@ -168,7 +170,7 @@ TEST(SnapLattice, CornersAreThoseOfAPlainSearch) {
         EXPECT_EQ((drawn.several.at(slice) >> (bit & 63) & 1) != 0,
                   found->second.size() > 1 || draws_fin);
         std::vector<std::uint32_t> members;
-        lattice.for_members(n, corner, [&](const LatticeEdge& edge) {
+        lattice.for_members(n, corner, [&](const surface::LatticeEdge& edge) {
           members.push_back(lattice.point_on(lattice.spot(n, edge.start), edge.axis));
         });
         std::ranges::sort(members);
@@ -182,8 +184,9 @@ TEST(SnapLattice, CornersAreThoseOfAPlainSearch) {
 
 /// The points that snap nowhere, as opposed to all their neighbours, which snap to two corners at
 /// most, or to `max` of them.
-std::set<std::uint32_t> plain_fins(const IsoSurface& surface, double epsilon, std::size_t max) {
-  const std::vector<EdgeCrossing> crossings = edge_crossings(surface);
+std::set<std::uint32_t> plain_fins(const surface::IsoSurface& surface, double epsilon,
+                                   std::size_t max) {
+  const std::vector<surface::EdgeCrossing> crossings = surface::edge_crossings(surface);
   std::map<std::uint32_t, std::set<std::uint32_t>> neighbours;
   for (const Triangle& t : surface.mesh.triangles)
     for (const std::uint32_t p : t)
@@ -208,10 +211,11 @@ TEST(SnapLattice, FinsAreThoseOfAPlainSearch) {
   std::size_t found = 0, with_three = 0;
   for (std::uint32_t seed = 0; seed < 20; ++seed)
     for (const double epsilon : {0.15, 0.3, 0.4}) {
-      const IsoSurface surface = marching_cubes({}, noise(14, seed, seed % 3 == 0 ? 4 : 0));
+      const surface::IsoSurface surface =
+          surface::marching_cubes({}, noise(14, seed, seed % 3 == 0 ? 4 : 0));
       std::set<std::uint32_t> fins;
-      const SnapLattice lattice = lattice_of(surface, epsilon);
-      for (const SnapFin& f : lattice.fins())
+      const surface::SnapLattice lattice = lattice_of(surface, epsilon);
+      for (const surface::SnapFin& f : lattice.fins())
         fins.insert(f.point);
       EXPECT_EQ(fins, plain_fins(surface, epsilon, 2));
       found += fins.size();
@@ -222,11 +226,12 @@ TEST(SnapLattice, FinsAreThoseOfAPlainSearch) {
 }
 
 TEST(SnapCollapse, MeshIsNotLookedAt) {
-  const Grid grid = metaballs(24, 1);
-  const IsoSurface plain = marching_cubes({}, grid), bare = marching_cubes_to_snap({}, grid);
+  const volume::Grid grid = metaballs(24, 1);
+  const surface::IsoSurface plain = surface::marching_cubes({}, grid),
+                            bare = surface::marching_cubes_to_snap({}, grid);
   EXPECT_FALSE(plain.mesh.triangles.empty());
   EXPECT_TRUE(bare.mesh.points.empty() && bare.mesh.triangles.empty());
-  const SnapResult a = snap({}, plain, {}), b = snap({}, bare, {});
+  const surface::SnapResult a = surface::snap({}, plain, {}), b = surface::snap({}, bare, {});
   EXPECT_EQ(a.mesh.points, b.mesh.points);
   EXPECT_EQ(a.mesh.triangles, b.mesh.triangles);
   EXPECT_EQ(a.report.triangles_before, plain.mesh.triangles.size());
@@ -234,4 +239,4 @@ TEST(SnapCollapse, MeshIsNotLookedAt) {
 }
 
 } // namespace
-} // namespace gewebe
+} // namespace gewebe::test

@@ -13,11 +13,11 @@
 #include <filesystem>
 #include <string>
 
-namespace gewebe {
+namespace gewebe::test {
 namespace {
 
 using namespace scenes;
-using Place = SnapOptions::Place;
+using Place = surface::SnapOptions::Place;
 
 /// Mean distances, to first order, from the exact isosurface of the balls' density.
 struct Errors {
@@ -32,9 +32,9 @@ Errors errors_of(const TriangleMesh& mesh, const std::vector<Ball>& balls) {
       Vec3 low = p, high = p;
       low[a] -= h;
       high[a] += h;
-      gradient[a] = (density(balls, high) - density(balls, low)) / (2 * h);
+      gradient[a] = (scenes::density(balls, high) - scenes::density(balls, low)) / (2 * h);
     }
-    return std::abs(density(balls, p) - 0.5) / norm(gradient);
+    return std::abs(scenes::density(balls, p) - 0.5) / norm(gradient);
   };
   Errors errors;
   for (const Vec3& p : mesh.points)
@@ -49,9 +49,9 @@ TEST(SnappingBounds, ErrorOfMetaballs) {
   Errors plain, mean, corner;
   for (std::uint32_t seed = 0; seed < 8; ++seed) {
     const std::vector<Ball> balls = five_balls(64, seed);
-    const IsoSurface surface = marching_cubes({}, metaballs(64, seed));
-    const auto add = [&](Errors& sum, const SnapOptions& options) {
-      const Errors errors = errors_of(snap({}, surface, options).mesh, balls);
+    const surface::IsoSurface surface = surface::marching_cubes({}, metaballs(64, seed));
+    const auto add = [&](Errors& sum, const surface::SnapOptions& options) {
+      const Errors errors = errors_of(surface::snap({}, surface, options).mesh, balls);
       sum.points += errors.points;
       sum.centroids += errors.centroids;
     };
@@ -69,61 +69,64 @@ TEST(SnappingBounds, AnglesOfMetaballs) {
   double one_percent = 0;
   constexpr std::uint32_t count = 12;
   for (std::uint32_t seed = 0; seed < count; ++seed) {
-    const IsoSurface surface = marching_cubes({}, metaballs(64, seed));
-    const SnapResult snapped = snap({}, surface, {0.5, Place::mean});
-    const MeshQuality quality = mesh_quality(snapped.mesh);
+    const surface::IsoSurface surface = surface::marching_cubes({}, metaballs(64, seed));
+    const surface::SnapResult snapped = surface::snap({}, surface, {0.5, Place::mean});
+    const mesh::MeshQuality quality = mesh::mesh_quality(snapped.mesh);
     one_percent += quality.angle_1_percent / count;
     EXPECT_EQ(snapped.report.zero_area, 0U) << seed;
-    EXPECT_EQ(self_intersections({}, snapped.mesh).pairs, 0U) << seed;
-    EXPECT_LT(mesh_quality(surface.mesh).angle_1_percent, 3) << seed; // and without
+    EXPECT_EQ(mesh::self_intersections({}, snapped.mesh).pairs, 0U) << seed;
+    EXPECT_LT(mesh::mesh_quality(surface.mesh).angle_1_percent, 3) << seed; // and without
   }
   RecordProperty("angle_1_percent", std::to_string(one_percent));
   EXPECT_GT(one_percent, 31);
 }
 
 /// The organ of shared data as a volume of exact fractions, or nothing.
-std::optional<Grid> organ(const std::string& file, const char* unit, int dim) {
+std::optional<volume::Grid> organ(const std::string& file, const char* unit, int dim) {
   const std::string path = test::shared_folder() + "/data/" + file;
   if (!std::filesystem::exists(path))
     return std::nullopt;
-  Input input(path);
-  MeshReadOptions options;
-  options.kind = file.ends_with("obj") ? Kind::obj : Kind::stl;
+  formats::Input input(path);
+  formats::MeshReadOptions options;
+  options.kind = file.ends_with("obj") ? formats::Kind::obj : formats::Kind::stl;
   options.unit = unit;
-  const TriangleMesh mesh = read_mesh(input, options);
-  CoverageReport report;
-  return exact_coverage({}, mesh, lattice_for_dim(bounding_box(mesh), dim), OpenMesh::refuse,
-                        &report);
+  const TriangleMesh mesh = formats::read_mesh(input, options);
+  antialiasing::CoverageReport report;
+  return antialiasing::exact_coverage({}, mesh, volume::lattice_for_dim(bounding_box(mesh), dim),
+                                      voxelization::OpenMesh::refuse, &report);
 }
 
-void check_organ(const Grid& grid) {
-  const SnapResult snapped = snap({}, marching_cubes({}, grid), {0.5, Place::mean});
-  EXPECT_TRUE(is_sound(examine_mesh(snapped.mesh)));
+void check_organ(const volume::Grid& grid) {
+  const surface::SnapResult snapped =
+      surface::snap({}, surface::marching_cubes({}, grid), {0.5, Place::mean});
+  EXPECT_TRUE(is_sound(mesh::examine_mesh(snapped.mesh)));
   EXPECT_EQ(snapped.report.zero_area, 0U);
-  EXPECT_EQ(self_intersections({}, snapped.mesh).pairs, 0U);
-  const MeshQuality quality = mesh_quality(snapped.mesh);
+  EXPECT_EQ(mesh::self_intersections({}, snapped.mesh).pairs, 0U);
+  const mesh::MeshQuality quality = mesh::mesh_quality(snapped.mesh);
   EXPECT_GT(quality.angle_1_percent, 30);
   EXPECT_LT(quality.share_below_10, 1e-3);
   // The negative control: without the flips corners leave flat faces that lie on each other.
-  TriangleMesh unflipped = snap({}, marching_cubes({}, grid), {0.25, Place::corner}).mesh;
-  const std::uint64_t flipped = self_intersections({}, unflipped).pairs;
-  unflipped.triangles = snap({}, marching_cubes({}, grid), {0.25, Place::mean}).mesh.triangles;
-  EXPECT_GT(self_intersections({}, unflipped).pairs, flipped);
+  TriangleMesh unflipped =
+      surface::snap({}, surface::marching_cubes({}, grid), {0.25, Place::corner}).mesh;
+  const std::uint64_t flipped = mesh::self_intersections({}, unflipped).pairs;
+  unflipped.triangles =
+      surface::snap({}, surface::marching_cubes({}, grid), {0.25, Place::mean}).mesh.triangles;
+  EXPECT_GT(mesh::self_intersections({}, unflipped).pairs, flipped);
 }
 
 TEST(SnappingBounds, Liver) {
-  const std::optional<Grid> grid = organ("sofa_liver_smooth.obj", "cm", 96);
+  const std::optional<volume::Grid> grid = organ("sofa_liver_smooth.obj", "cm", 96);
   if (!grid)
     GTEST_SKIP() << "no sofa_liver_smooth.obj";
   check_organ(*grid);
 }
 
 TEST(SnappingBounds, Colon) {
-  const std::optional<Grid> grid = organ("gca90_large_intestine_20k.stl", "mm", 128);
+  const std::optional<volume::Grid> grid = organ("gca90_large_intestine_20k.stl", "mm", 128);
   if (!grid)
     GTEST_SKIP() << "no gca90_large_intestine_20k.stl";
   check_organ(*grid);
 }
 
 } // namespace
-} // namespace gewebe
+} // namespace gewebe::test

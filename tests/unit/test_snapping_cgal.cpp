@@ -9,7 +9,7 @@
 
 #include <gtest/gtest.h>
 
-namespace gewebe {
+namespace gewebe::test {
 namespace {
 
 using namespace scenes;
@@ -37,9 +37,9 @@ TEST(SnappingCgal, RandomScenesKeepTheirTopology) {
 TEST(SnappingCgal, NaiveSnappingFailsTheSameTest) {
   int ours = 0, cgal = 0;
   for (std::uint32_t n = 0; n < 40; ++n) {
-    const IsoSurface surface = marching_cubes({}, stress_scene(n).grid);
+    const surface::IsoSurface surface = surface::marching_cubes({}, stress_scene(n).grid);
     const TriangleMesh naive = snap_naively(surface, 0.35);
-    ours += keeps_topology(examine_mesh(surface.mesh), examine_mesh(naive)) ? 0 : 1;
+    ours += keeps_topology(mesh::examine_mesh(surface.mesh), mesh::examine_mesh(naive)) ? 0 : 1;
     cgal += cgal_verdict(naive) == cgal_verdict(surface.mesh) ? 0 : 1;
   }
   EXPECT_GT(ours, 12);
@@ -48,31 +48,32 @@ TEST(SnappingCgal, NaiveSnappingFailsTheSameTest) {
 
 TEST(SnappingCgal, MetaballsBoundAVolume) {
   for (std::uint32_t seed = 0; seed < 12; ++seed) {
-    const IsoSurface surface = marching_cubes({}, metaballs(20, seed));
+    const surface::IsoSurface surface = surface::marching_cubes({}, metaballs(20, seed));
     EXPECT_TRUE(faces_outward(surface.mesh));
     for (const double epsilon : {0.0, 0.15, 0.5})
-      for (const auto place : {SnapOptions::Place::mean, SnapOptions::Place::corner})
-        EXPECT_TRUE(faces_outward(snap({}, surface, {epsilon, place}).mesh)) << seed;
+      for (const auto place :
+           {surface::SnapOptions::Place::mean, surface::SnapOptions::Place::corner})
+        EXPECT_TRUE(faces_outward(surface::snap({}, surface, {epsilon, place}).mesh)) << seed;
   }
 }
 
 TEST(SnappingCgal, TurnedFacesDoNotBoundAVolume) {
-  TriangleMesh mesh = marching_cubes({}, metaballs(20, 1)).mesh;
+  TriangleMesh mesh = surface::marching_cubes({}, metaballs(20, 1)).mesh;
   for (Triangle& t : mesh.triangles)
     std::swap(t[1], t[2]);
   EXPECT_FALSE(faces_outward(mesh));
 }
 
 TEST(SnappingCgal, CavityBoundsAVolume) {
-  const Grid grid = sample({}, {-15, -15, -15}, {15, 15, 15}, [](int i, int j, int k) {
+  const volume::Grid grid = sample({}, {-15, -15, -15}, {15, 15, 15}, [](int i, int j, int k) {
     const double r = std::sqrt(i * i + j * j + k * k);
     return 0.5 + std::min(12.3 - r, r - 7.1);
   });
-  const TriangleMesh mesh = snap({}, marching_cubes({}, grid), {}).mesh;
+  const TriangleMesh mesh = surface::snap({}, surface::marching_cubes({}, grid), {}).mesh;
   const test::CgalVerdict verdict = cgal_verdict(mesh);
   EXPECT_TRUE(verdict.manifold && verdict.closed);
   EXPECT_TRUE(faces_outward(mesh));
 }
 
 } // namespace
-} // namespace gewebe
+} // namespace gewebe::test

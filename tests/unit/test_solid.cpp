@@ -16,7 +16,7 @@
 #include <random>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::test {
 namespace {
 
 using Eigen::Matrix3d;
@@ -33,14 +33,14 @@ constexpr std::size_t nodes_of(Kind kind) {
   return kind == Kind::linear ? 4 : 10;
 }
 
-MatrixXd stiffness(const SolidElement& e, Kind kind) {
+MatrixXd stiffness(const fem::SolidElement& e, Kind kind) {
   const std::size_t n = nodes_of(kind);
   MatrixXd k(3 * n, 3 * n);
   for (std::size_t a = 0; a < n; ++a)
     for (std::size_t b = 0; b < n; ++b) {
-      const SolidBlock block = kind == Kind::linear  ? linear_block(e, a, b)
-                               : kind == Kind::plain ? plain_quadratic_block(e, a, b)
-                                                     : quadratic_block(e, a, b);
+      const fem::SolidBlock block = kind == Kind::linear  ? fem::linear_block(e, a, b)
+                                    : kind == Kind::plain ? fem::plain_quadratic_block(e, a, b)
+                                                          : fem::quadratic_block(e, a, b);
       for (std::size_t i = 0; i < 9; ++i)
         k(static_cast<Eigen::Index>(3 * a + i / 3), static_cast<Eigen::Index>(3 * b + i % 3)) =
             block[i];
@@ -96,7 +96,8 @@ struct ByDefinition {
   MatrixXd k;         ///< 30 × 30
   MatrixXd body_load; ///< 30 × 3, per force along each axis
 };
-ByDefinition by_definition(const std::array<Vec3, 4>& c, const Elasticity& m, bool with_bubble) {
+ByDefinition by_definition(const std::array<Vec3, 4>& c, const fem::Elasticity& m,
+                           bool with_bubble) {
   Matrix3d edges;
   for (int j = 0; j < 3; ++j)
     edges.col(j) = eigen(c[static_cast<std::size_t>(j + 1)] - c[0]);
@@ -162,8 +163,8 @@ ByDefinition by_definition(const std::array<Vec3, 4>& c, const Elasticity& m, bo
 
 TEST(Solid, ElementIsItsDefinitionIntegratedNumerically) {
   for (const double poisson : {0.0, 0.3, 0.49, 0.4999}) {
-    const Elasticity m = elasticity(young, poisson);
-    const SolidElement e = solid_element(corners, m);
+    const fem::Elasticity m = fem::elasticity(young, poisson);
+    const fem::SolidElement e = fem::solid_element(corners, m);
     const ByDefinition with = by_definition(corners, m, true),
                        without = by_definition(corners, m, false);
     EXPECT_LE((stiffness(e, Kind::quadratic) - with.k).norm(), 1e-13 * without.k.norm()) << poisson;
@@ -173,7 +174,7 @@ TEST(Solid, ElementIsItsDefinitionIntegratedNumerically) {
       std::array<Vec3, 10> load;
       Vec3 along;
       along[axis] = 1;
-      body_load(e, along, load);
+      fem::body_load(e, along, load);
       for (int a = 0; a < 10; ++a)
         for (int i = 0; i < 3; ++i)
           EXPECT_NEAR(load[static_cast<std::size_t>(a)][i], with.body_load(3 * a + i, axis),
@@ -185,31 +186,32 @@ TEST(Solid, ElementIsItsDefinitionIntegratedNumerically) {
 TEST(Solid, LameConstantsAreThoseOfTheLaw) {
   // Pulled along x: stress E, strain across -nu.
   for (const double poisson : {0.0, 0.3, 0.499}) {
-    const auto [lambda, mu] = elasticity(young, poisson);
+    const auto [lambda, mu] = fem::elasticity(young, poisson);
     const double trace = 1 - 2 * poisson;
     EXPECT_NEAR(lambda * trace + 2 * mu, young, 1e-12 * young);
     EXPECT_NEAR(lambda * trace - 2 * mu * poisson, 0, 1e-12 * young);
   }
   const double nan = std::numeric_limits<double>::quiet_NaN();
   for (const double wrong : {0.5, 0.6, -0.1, nan})
-    EXPECT_THROW(elasticity(young, wrong), Error) << wrong;
+    EXPECT_THROW(fem::elasticity(young, wrong), Error) << wrong;
   for (const double wrong : {0.0, -1.0, nan, HUGE_VAL})
-    EXPECT_THROW(elasticity(wrong, 0.3), Error) << wrong;
+    EXPECT_THROW(fem::elasticity(wrong, 0.3), Error) << wrong;
 }
 
 TEST(Solid, ElementsWithoutVolumeAreRefused) {
-  const Elasticity m = elasticity(young, 0.3);
-  EXPECT_THROW(solid_element({corners[1], corners[0], corners[2], corners[3]}, m), Error);
-  EXPECT_THROW(solid_element({corners[0], corners[0], corners[2], corners[3]}, m), Error);
+  const fem::Elasticity m = fem::elasticity(young, 0.3);
+  EXPECT_THROW(fem::solid_element({corners[1], corners[0], corners[2], corners[3]}, m), Error);
+  EXPECT_THROW(fem::solid_element({corners[0], corners[0], corners[2], corners[3]}, m), Error);
   std::array<Vec3, 4> broken = corners;
   broken[2].y = std::numeric_limits<double>::quiet_NaN();
-  EXPECT_THROW(solid_element(broken, m), Error);
+  EXPECT_THROW(fem::solid_element(broken, m), Error);
 }
 
 TEST(Solid, ElementsAreSymmetricAndFreeInRigidMotionsAlone) {
   for (const double poisson : {0.0, 0.3, 0.499, 0.49999})
     for (const Kind kind : {Kind::linear, Kind::plain, Kind::quadratic}) {
-      const MatrixXd k = stiffness(solid_element(corners, elasticity(young, poisson)), kind);
+      const MatrixXd k =
+          stiffness(fem::solid_element(corners, fem::elasticity(young, poisson)), kind);
       EXPECT_LE((k - k.transpose()).norm(), 1e-15 * k.norm());
       const VectorXd value = Eigen::SelfAdjointEigenSolver<MatrixXd>(k).eigenvalues();
       const double largest = value[value.size() - 1];
@@ -242,11 +244,12 @@ TEST(Solid, AnotherFrameGivesTheSameElement) {
   // Another order of the corners, and of the middles with it.
   const std::array<std::size_t, 10> other{1, 2, 0, 3, 5, 6, 4, 8, 9, 7};
   for (const Kind kind : {Kind::linear, Kind::plain, Kind::quadratic}) {
-    const Elasticity m = elasticity(young, 0.49);
-    const MatrixXd k = stiffness(solid_element(corners, m), kind),
-                   kt = stiffness(solid_element(turned, m), kind),
+    const fem::Elasticity m = fem::elasticity(young, 0.49);
+    const MatrixXd k = stiffness(fem::solid_element(corners, m), kind),
+                   kt = stiffness(fem::solid_element(turned, m), kind),
                    ko = stiffness(
-                       solid_element({corners[1], corners[2], corners[0], corners[3]}, m), kind);
+                       fem::solid_element({corners[1], corners[2], corners[0], corners[3]}, m),
+                       kind);
     for (Eigen::Index a = 0; a < k.rows() / 3; ++a)
       for (Eigen::Index b = 0; b < k.rows() / 3; ++b) {
         EXPECT_LE(
@@ -262,14 +265,14 @@ TEST(Solid, AnotherFrameGivesTheSameElement) {
 }
 
 /// A box whose inner nodes stand anywhere, its volume 8.
-TetMesh distorted(bool quadratic) {
-  TetMesh mesh = test::distorted_box();
+tetrahedra::TetMesh distorted(bool quadratic) {
+  tetrahedra::TetMesh mesh = test::distorted_box();
   if (quadratic)
-    make_quadratic(mesh);
+    tetrahedra::make_quadratic(mesh);
   return mesh;
 }
 
-std::array<Vec3, 4> corners_of(const TetMesh& mesh, std::size_t t) {
+std::array<Vec3, 4> corners_of(const tetrahedra::TetMesh& mesh, std::size_t t) {
   std::array<Vec3, 4> c;
   for (std::size_t k = 0; k < 4; ++k)
     c[k] = mesh.points[mesh.tetrahedra[t][k]];
@@ -280,14 +283,14 @@ TEST(Solid, ConstantStrainIsInBalanceOnADistortedMesh) {
   const Matrix3d gradient{{0.3, -0.2, 0.5}, {0.7, 0.1, -0.4}, {-0.6, 0.2, 0.25}};
   for (const double poisson : {0.0, 0.3, 0.4999})
     for (const bool order2 : {false, true}) {
-      const TetMesh mesh = distorted(order2);
-      const Elasticity m = elasticity(young, poisson);
+      const tetrahedra::TetMesh mesh = distorted(order2);
+      const fem::Elasticity m = fem::elasticity(young, poisson);
       const Matrix3d stress = m.lambda * gradient.trace() * Matrix3d::Identity() +
                               m.mu * (gradient + gradient.transpose());
       std::vector<Vector3d> force(mesh.points.size(), Vector3d::Zero());
       const auto displacement = [&](const Vec3& p) -> Vector3d { return gradient * eigen(p); };
       for (std::size_t t = 0; t < mesh.tetrahedra.size(); ++t) {
-        const SolidElement e = solid_element(corners_of(mesh, t), m);
+        const fem::SolidElement e = fem::solid_element(corners_of(mesh, t), m);
         std::vector<std::uint32_t> node(mesh.tetrahedra[t].begin(), mesh.tetrahedra[t].end());
         if (order2)
           node.insert(node.end(), mesh.middles[t].begin(), mesh.middles[t].end());
@@ -301,7 +304,7 @@ TEST(Solid, ConstantStrainIsInBalanceOnADistortedMesh) {
         const VectorXd f = stiffness(e, order2 ? Kind::quadratic : Kind::linear) * u;
         for (std::size_t a = 0; a < node.size(); ++a)
           force[node[a]] += f.segment<3>(static_cast<Eigen::Index>(3 * a));
-        for (const SolidBlock& found : displacement_gradients(e, values))
+        for (const fem::SolidBlock& found : fem::displacement_gradients(e, values))
           for (int i = 0; i < 9; ++i)
             EXPECT_NEAR(found[static_cast<std::size_t>(i)], gradient(i / 3, i % 3), 1e-12);
       }
@@ -323,8 +326,8 @@ TEST(Solid, StressesAreInBalanceWithTheForcesOfNodes) {
   std::mt19937 random(3);
   std::uniform_real_distribution<double> any(-1, 1);
   for (const double poisson : {0.0, 0.3, 0.499}) {
-    const Elasticity m = elasticity(young, poisson);
-    const SolidElement e = solid_element(corners, m);
+    const fem::Elasticity m = fem::elasticity(young, poisson);
+    const fem::SolidElement e = fem::solid_element(corners, m);
     std::vector<Vec3> u(10);
     VectorXd flat(30);
     for (int a = 0; a < 10; ++a)
@@ -332,9 +335,9 @@ TEST(Solid, StressesAreInBalanceWithTheForcesOfNodes) {
         flat[3 * a + i] = u[static_cast<std::size_t>(a)][i] = any(random);
     const Vec3 density{200 * any(random), 300 * any(random), 100 * any(random)};
     std::array<Vec3, 10> load;
-    body_load(e, density, load);
+    fem::body_load(e, density, load);
     const VectorXd f = stiffness(e, Kind::quadratic) * flat;
-    const auto gradient = displacement_gradients(e, u, density);
+    const auto gradient = fem::displacement_gradients(e, u, density);
     std::array<Matrix3d, 4> stress;
     for (std::size_t p = 0; p < 4; ++p) {
       Matrix3d g;
@@ -366,4 +369,4 @@ TEST(Solid, StressesAreInBalanceWithTheForcesOfNodes) {
 }
 
 } // namespace
-} // namespace gewebe
+} // namespace gewebe::test

@@ -24,16 +24,16 @@
 #include <utility>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::test {
 namespace {
 
-const std::vector<SolidMaterial> two{{2500, 0.3, 1.1e-3}, {400, 0.499, 0.9e-3}};
+const std::vector<fem::SolidMaterial> two{{2500, 0.3, 1.1e-3}, {400, 0.499, 0.9e-3}};
 
 /// A box 2 × 2 × 2 whose inner nodes stand anywhere.
-TetMesh distorted(bool quadratic, bool materials) {
-  TetMesh mesh = test::distorted_box();
+tetrahedra::TetMesh distorted(bool quadratic, bool materials) {
+  tetrahedra::TetMesh mesh = test::distorted_box();
   if (quadratic)
-    make_quadratic(mesh);
+    tetrahedra::make_quadratic(mesh);
   if (materials)
     for (std::size_t t = 0; t < mesh.tetrahedra.size(); ++t)
       mesh.material.push_back(t % 3 == 0);
@@ -55,19 +55,19 @@ TEST(SolidAssembly, MatrixMultipliesAsItsElementsDo) {
   std::mt19937 random(1);
   std::uniform_real_distribution<double> any(-1, 1);
   for (const bool quadratic : {false, true}) {
-    const TetMesh mesh = distorted(quadratic, true);
-    const auto elements = solid_elements(mesh, two);
+    const tetrahedra::TetMesh mesh = distorted(quadratic, true);
+    const auto elements = fem::solid_elements(mesh, two);
     std::vector<std::uint8_t> fixed(3 * mesh.points.size());
     for (std::uint8_t& f : fixed)
       f = random() % 5 == 0;
-    const StiffnessMatrix k = solid_stiffness(mesh, elements, fixed);
+    const linalg::StiffnessMatrix k = fem::solid_stiffness(mesh, elements, fixed);
     std::vector<double> u(fixed.size()), f(fixed.size()), x, y(k.order());
     for (std::size_t axis = 0; axis < u.size(); ++axis)
       u[axis] = fixed[axis] != 0 ? 0 : any(random);
     for (const std::int64_t axis : k.axis_of_row)
       x.push_back(u[static_cast<std::size_t>(axis)]);
-    multiply(k, x, y);
-    multiply_solid(mesh, elements, u, f);
+    linalg::multiply(k, x, y);
+    fem::multiply_solid(mesh, elements, u, f);
     for (std::size_t r = 0; r < y.size(); ++r)
       EXPECT_NEAR(y[r], f[static_cast<std::size_t>(k.axis_of_row[r])], 1e-13 * largest(f));
     for (std::size_t c = 0; c < k.order(); ++c) {
@@ -75,20 +75,20 @@ TEST(SolidAssembly, MatrixMultipliesAsItsElementsDo) {
       for (auto at = k.column_start[c] + 1; at < k.column_start[c + 1]; ++at)
         EXPECT_LT(k.row[static_cast<std::size_t>(at - 1)], k.row[static_cast<std::size_t>(at)]);
     }
-    EXPECT_THROW(solid_stiffness(mesh, elements, std::vector<std::uint8_t>(fixed.size(), 1)),
+    EXPECT_THROW(fem::solid_stiffness(mesh, elements, std::vector<std::uint8_t>(fixed.size(), 1)),
                  Error);
   }
 }
 
 TEST(SolidAssembly, AnyNumberOfThreadsGivesTheSameBytes) {
-  TetMesh mesh = test::box_tetrahedra(5, 4, 12, 0.3);
-  make_quadratic(mesh);
+  tetrahedra::TetMesh mesh = test::box_tetrahedra(5, 4, 12, 0.3);
+  tetrahedra::make_quadratic(mesh);
   const auto with = [&](int threads) {
     Context context;
     context.threads = threads;
-    return solid_stiffness(mesh, solid_elements(mesh, two, context), {}, context);
+    return fem::solid_stiffness(mesh, fem::solid_elements(mesh, two, context), {}, context);
   };
-  const StiffnessMatrix one = with(1), five = with(5);
+  const linalg::StiffnessMatrix one = with(1), five = with(5);
   EXPECT_TRUE(test::same_bytes(one.value, five.value));
   EXPECT_TRUE(test::same_bytes(one.row, five.row));
   EXPECT_EQ(one.column_start, five.column_start);
@@ -102,9 +102,9 @@ TEST(SolidAssembly, PatchTestIsSolved) {
       EXPECT_LE(figure(patch), 1e-12);
       const auto& [mesh, materials, elements, fixed] = patch.solid;
       const auto stresses =
-          solid_stresses(elements, solid_strains(mesh, materials, elements, patch.given));
-      const auto [lambda, mu] = elasticity(2500, poisson);
-      for (const SymmetricBlock& at_node : nodal_tensors(mesh, elements, stresses)) {
+          fem::solid_stresses(elements, fem::solid_strains(mesh, materials, elements, patch.given));
+      const auto [lambda, mu] = fem::elasticity(2500, poisson);
+      for (const linalg::SymmetricBlock& at_node : fem::nodal_tensors(mesh, elements, stresses)) {
         EXPECT_NEAR(at_node[0], lambda * 6e-3 + 2 * mu * 3e-3, 1e-12 * (lambda + mu));
         EXPECT_NEAR(at_node[1], mu * 5e-3, 1e-12 * (lambda + mu));
         EXPECT_NEAR(at_node[4], mu * -2e-3, 1e-12 * (lambda + mu));
@@ -114,14 +114,14 @@ TEST(SolidAssembly, PatchTestIsSolved) {
 
 TEST(SolidAssembly, MassesArePositiveAndComplete) {
   for (const bool quadratic : {false, true}) {
-    const TetMesh mesh = distorted(quadratic, true);
-    const auto masses = solid_masses(mesh, two);
+    const tetrahedra::TetMesh mesh = distorted(quadratic, true);
+    const auto masses = fem::solid_masses(mesh, two);
     double expected = 0;
     for (std::size_t t = 0; t < mesh.tetrahedra.size(); ++t) {
       const Tetrahedron& c = mesh.tetrahedra[t];
       expected += two[static_cast<std::size_t>(mesh.material[t])].density *
-                  tetrahedron_volume(mesh.points[c[0]], mesh.points[c[1]], mesh.points[c[2]],
-                                     mesh.points[c[3]]);
+                  tetrahedra::tetrahedron_volume(mesh.points[c[0]], mesh.points[c[1]],
+                                                 mesh.points[c[2]], mesh.points[c[3]]);
     }
     double total = 0;
     for (const double m : masses) {
@@ -131,11 +131,11 @@ TEST(SolidAssembly, MassesArePositiveAndComplete) {
     EXPECT_NEAR(total, expected, 1e-14 * expected);
   }
   // One element: the diagonal of the consistent mass is in the proportion 6 : 32.
-  TetMesh one;
+  tetrahedra::TetMesh one;
   one.points = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
   one.tetrahedra = {{0, 1, 2, 3}};
-  make_quadratic(one);
-  const auto masses = solid_masses(one, two);
+  tetrahedra::make_quadratic(one);
+  const auto masses = fem::solid_masses(one, two);
   for (std::size_t i = 0; i < 10; ++i)
     EXPECT_NEAR(masses[i], 1.1e-3 / 6 * (i < 4 ? 6 : 32) / 216, 1e-18);
 }
@@ -143,7 +143,7 @@ TEST(SolidAssembly, MassesArePositiveAndComplete) {
 struct Sums {
   Vec3 force, moment;
 };
-Sums sums(const TetMesh& mesh, const std::vector<double>& load) {
+Sums sums(const tetrahedra::TetMesh& mesh, const std::vector<double>& load) {
   Sums s;
   for (std::size_t i = 0; i < mesh.points.size(); ++i) {
     s.force += of_axes(load, i);
@@ -157,15 +157,15 @@ void expect_near(const Vec3& a, const Vec3& b, double scale) {
 
 TEST(SolidAssembly, LoadsAddUpToTheirForceAndMoment) {
   for (const bool quadratic : {false, true}) {
-    TetMesh mesh = distorted(quadratic, false);
-    const auto elements = solid_elements(mesh, two);
+    tetrahedra::TetMesh mesh = distorted(quadratic, false);
+    const auto elements = fem::solid_elements(mesh, two);
     const Vec3 g{100, -200, -9810};
     const double mass = 8 * two[0].density;
-    const Sums weight = sums(mesh, gravity_load(mesh, two, elements, g));
+    const Sums weight = sums(mesh, fem::gravity_load(mesh, two, elements, g));
     expect_near(weight.force, mass * g, mass * norm(g));
     expect_near(weight.moment, cross({1, 1, 1}, mass * g), mass * norm(g));
 
-    const TetBoundary faces = boundary(mesh);
+    const tetrahedra::TetBoundary faces = tetrahedra::boundary(mesh);
     std::vector<std::uint32_t> all(faces.mesh.triangles.size()), right;
     std::iota(all.begin(), all.end(), 0U);
     for (const std::uint32_t k : all) {
@@ -175,13 +175,13 @@ TEST(SolidAssembly, LoadsAddUpToTheirForceAndMoment) {
       if (in_plane)
         right.push_back(k);
     }
-    const Sums pressed = sums(mesh, pressure_load(mesh, faces, right, 50));
+    const Sums pressed = sums(mesh, fem::pressure_load(mesh, faces, right, 50));
     expect_near(pressed.force, {-200, 0, 0}, 200);
     expect_near(pressed.moment, cross({2, 1, 1}, {-200, 0, 0}), 200);
-    const Sums pulled = sums(mesh, traction_load(mesh, faces, right, {7, -5, 3}));
+    const Sums pulled = sums(mesh, fem::traction_load(mesh, faces, right, {7, -5, 3}));
     expect_near(pulled.force, {28, -20, 12}, 30);
     expect_near(pulled.moment, cross({2, 1, 1}, {28, -20, 12}), 30);
-    const Sums closed = sums(mesh, pressure_load(mesh, faces, all, 50));
+    const Sums closed = sums(mesh, fem::pressure_load(mesh, faces, all, 50));
     expect_near(closed.force, {}, 200);
     expect_near(closed.moment, {}, 200);
   }
@@ -191,18 +191,18 @@ TEST(SolidAssembly, LoadsAddUpToTheirForceAndMoment) {
 TEST(SolidAssembly, PressureAllAroundShrinksTheBodyEvenly) {
   for (const bool quadratic : {false, true})
     for (const double poisson : {0.3, 0.499}) {
-      const TetMesh mesh = distorted(quadratic, false);
-      const std::vector<SolidMaterial> material{{2500, poisson, 1e-3}};
-      const auto elements = solid_elements(mesh, material);
-      const TetBoundary faces = boundary(mesh);
+      const tetrahedra::TetMesh mesh = distorted(quadratic, false);
+      const std::vector<fem::SolidMaterial> material{{2500, poisson, 1e-3}};
+      const auto elements = fem::solid_elements(mesh, material);
+      const tetrahedra::TetBoundary faces = tetrahedra::boundary(mesh);
       std::vector<std::uint32_t> all(faces.mesh.triangles.size());
       std::iota(all.begin(), all.end(), 0U);
-      const auto load = pressure_load(mesh, faces, all, 50);
+      const auto load = fem::pressure_load(mesh, faces, all, 50);
       const double shrink = 50 * (1 - 2 * poisson) / 2500;
       std::vector<double> u(load.size()), f(load.size());
       for (std::size_t axis = 0; axis < u.size(); ++axis)
         u[axis] = -shrink * mesh.points[axis / 3][static_cast<int>(axis % 3)];
-      multiply_solid(mesh, elements, u, f);
+      fem::multiply_solid(mesh, elements, u, f);
       for (std::size_t axis = 0; axis < u.size(); ++axis)
         EXPECT_NEAR(f[axis], load[axis], 1e-11 * largest(load));
     }
@@ -212,11 +212,11 @@ TEST(SolidAssembly, PressureAllAroundShrinksTheBodyEvenly) {
 /// with the pressure that grows downwards, at any nu.
 TEST(SolidAssembly, WeightInABoxIsFoundExactly) {
   for (const double poisson : {0.3, 0.499}) {
-    const TetMesh mesh = distorted(true, false);
-    const std::vector<SolidMaterial> material{{2500, poisson, 1e-3}};
-    const auto elements = solid_elements(mesh, material);
+    const tetrahedra::TetMesh mesh = distorted(true, false);
+    const std::vector<fem::SolidMaterial> material{{2500, poisson, 1e-3}};
+    const auto elements = fem::solid_elements(mesh, material);
     const Vec3 g{0, 0, -9810};
-    const auto [lambda, mu] = elasticity(2500, poisson);
+    const auto [lambda, mu] = fem::elasticity(2500, poisson);
     const double weight = 1e-3 * 9810, modulus = lambda + 2 * mu;
     std::vector<std::uint8_t> fixed(3 * mesh.points.size());
     for (std::size_t i = 0; i < mesh.points.size(); ++i) {
@@ -225,16 +225,17 @@ TEST(SolidAssembly, WeightInABoxIsFoundExactly) {
       fixed[3 * i + 1] = p.y == 0 || p.y == 2;
       fixed[3 * i + 2] = p.z == 0;
     }
-    const StiffnessMatrix k = solid_stiffness(mesh, elements, fixed);
+    const linalg::StiffnessMatrix k = fem::solid_stiffness(mesh, elements, fixed);
     std::vector<double> u(fixed.size());
-    solve_axes(k, Factor(k, {}), gravity_load(mesh, material, elements, g), u);
+    linalg::solve_axes(k, linalg::Factor(k, {}), fem::gravity_load(mesh, material, elements, g), u);
     const double most = weight / modulus * 2;
     for (std::size_t i = 0; i < mesh.points.size(); ++i) {
       const double z = mesh.points[i].z;
       expect_near(of_axes(u, i), {0, 0, -weight / modulus * (2 * z - z * z / 2)}, most);
     }
-    const auto stresses = nodal_tensors(
-        mesh, elements, solid_stresses(elements, solid_strains(mesh, material, elements, u, g)));
+    const auto stresses = fem::nodal_tensors(
+        mesh, elements,
+        fem::solid_stresses(elements, fem::solid_strains(mesh, material, elements, u, g)));
     for (std::size_t i = 0; i < mesh.points.size(); ++i)
       EXPECT_NEAR(stresses[i][5], -weight * (2 - mesh.points[i].z), 1e-9 * 2 * weight);
   }
@@ -242,17 +243,18 @@ TEST(SolidAssembly, WeightInABoxIsFoundExactly) {
 
 TEST(SolidAssembly, FieldsOfALinearDisplacementAreThoseOfItsGradient) {
   const std::array<double, 9> g{0.02, 0.01, -0.03, 0.005, -0.01, 0.02, 0.04, 0.03, 0.015};
-  const SymmetricBlock strain{g[0], (g[1] + g[3]) / 2, (g[2] + g[6]) / 2,
-                              g[4], (g[5] + g[7]) / 2, g[8]};
+  const linalg::SymmetricBlock strain{g[0], (g[1] + g[3]) / 2, (g[2] + g[6]) / 2,
+                                      g[4], (g[5] + g[7]) / 2, g[8]};
   for (const bool quadratic : {false, true}) {
-    const TetMesh mesh = distorted(quadratic, false);
-    const std::vector<SolidMaterial> material{{2500, 0.3, 1e-3}};
+    const tetrahedra::TetMesh mesh = distorted(quadratic, false);
+    const std::vector<fem::SolidMaterial> material{{2500, 0.3, 1e-3}};
     std::vector<double> u;
     for (const Vec3& p : mesh.points)
       for (std::size_t i = 0; i < 3; ++i)
         u.push_back(g[3 * i] * p.x + g[3 * i + 1] * p.y + g[3 * i + 2] * p.z);
-    const SolidFields fields = solid_fields(mesh, material, solid_elements(mesh, material), u);
-    const auto [lambda, mu] = elasticity(2500, 0.3);
+    const fem::SolidFields fields =
+        fem::solid_fields(mesh, material, fem::solid_elements(mesh, material), u);
+    const auto [lambda, mu] = fem::elasticity(2500, 0.3);
     ASSERT_EQ(fields.node_strain.size(), mesh.points.size());
     ASSERT_EQ(fields.element_stress.size(), mesh.tetrahedra.size());
     for (std::size_t k = 0; k < 6; ++k) {
@@ -260,10 +262,10 @@ TEST(SolidAssembly, FieldsOfALinearDisplacementAreThoseOfItsGradient) {
       const double stress =
           2 * mu * strain[k] + (diagonal ? lambda * (strain[0] + strain[3] + strain[5]) : 0);
       for (const auto* const all : {&fields.node_strain, &fields.element_strain})
-        for (const SymmetricBlock& one : *all)
+        for (const linalg::SymmetricBlock& one : *all)
           EXPECT_NEAR(one[k], strain[k], 1e-13);
       for (const auto* const all : {&fields.node_stress, &fields.element_stress})
-        for (const SymmetricBlock& one : *all)
+        for (const linalg::SymmetricBlock& one : *all)
           EXPECT_NEAR(one[k], stress, 1e-13 * (lambda + mu));
     }
   }
@@ -272,10 +274,10 @@ TEST(SolidAssembly, FieldsOfALinearDisplacementAreThoseOfItsGradient) {
 /// Gravity strains the bubbles of quadratic elements. A body rotated by R has the strains of an
 /// unrotated body under Rᵀ g, rotated by R.
 TEST(SolidAssembly, StrainsUnderGravityRotateWithTheBody) {
-  TetMesh mesh = test::distorted_box();
-  make_quadratic(mesh);
-  const std::vector<SolidMaterial> material{{2500, 0.45, 1e-3}};
-  const auto elements = solid_elements(mesh, material);
+  tetrahedra::TetMesh mesh = test::distorted_box();
+  tetrahedra::make_quadratic(mesh);
+  const std::vector<fem::SolidMaterial> material{{2500, 0.45, 1e-3}};
+  const auto elements = fem::solid_elements(mesh, material);
   const Eigen::Vector3d w(0.5, -1.2, 0.8), g(300, -9810, 4000);
   const Eigen::Matrix3d r = Eigen::AngleAxisd(w.norm(), w.normalized()).toRotationMatrix();
   std::vector<double> turned;
@@ -284,11 +286,12 @@ TEST(SolidAssembly, StrainsUnderGravityRotateWithTheBody) {
     turned.insert(turned.end(), {u.x(), u.y(), u.z()});
   }
   const Eigen::Vector3d back = r.transpose() * g;
-  const auto at_rest = solid_strains(mesh, material, elements, std::vector<double>(turned.size()),
-                                     {back.x(), back.y(), back.z()}),
-             found = solid_strains(mesh, material, elements, turned, {g.x(), g.y(), g.z()},
-                                   StrainFrames::turning);
-  const auto matrix = [](const SymmetricBlock& s) {
+  const auto at_rest =
+                 fem::solid_strains(mesh, material, elements, std::vector<double>(turned.size()),
+                                    {back.x(), back.y(), back.z()}),
+             found = fem::solid_strains(mesh, material, elements, turned, {g.x(), g.y(), g.z()},
+                                        fem::StrainFrames::turning);
+  const auto matrix = [](const linalg::SymmetricBlock& s) {
     Eigen::Matrix3d m;
     m << s[0], s[1], s[2], s[1], s[3], s[4], s[2], s[4], s[5];
     return m;
@@ -307,16 +310,17 @@ TEST(SolidAssembly, StrainsUnderGravityRotateWithTheBody) {
 /// u = (0, a x², 0) turns a body by a x about z, and shears it by as much. In turning frames the
 /// strain at a corner is turned by the rotation of that corner.
 TEST(SolidAssembly, StrainsOfABentBodyTurnAtEachCorner) {
-  TetMesh mesh = test::distorted_box();
-  make_quadratic(mesh);
-  const std::vector<SolidMaterial> material{{2500, 0.3, 1e-3}};
-  const auto elements = solid_elements(mesh, material);
+  tetrahedra::TetMesh mesh = test::distorted_box();
+  tetrahedra::make_quadratic(mesh);
+  const std::vector<fem::SolidMaterial> material{{2500, 0.3, 1e-3}};
+  const auto elements = fem::solid_elements(mesh, material);
   constexpr double a = 0.7;
   std::vector<double> u;
   for (const Vec3& p : mesh.points)
     u.insert(u.end(), {0, a * p.x * p.x, 0});
-  const auto plain = solid_strains(mesh, material, elements, u),
-             found = solid_strains(mesh, material, elements, u, {}, StrainFrames::turning);
+  const auto plain = fem::solid_strains(mesh, material, elements, u),
+             found =
+                 fem::solid_strains(mesh, material, elements, u, {}, fem::StrainFrames::turning);
   double size = 0, worst = 0;
   for (std::size_t t = 0; t < elements.size(); ++t)
     for (std::size_t p = 0; p < 4; ++p) {
@@ -331,27 +335,28 @@ TEST(SolidAssembly, StrainsOfABentBodyTurnAtEachCorner) {
 }
 
 TEST(SolidAssembly, VonMisesIsThatOfTensionShearAndPressure) {
-  EXPECT_DOUBLE_EQ(von_mises({0, 0, 0, -30, 0, 0}), 30);
-  EXPECT_DOUBLE_EQ(von_mises({5, 0, 0, 35, 0, 5}), 30); // a pressure adds nothing
-  EXPECT_EQ(von_mises({7, 0, 0, 7, 0, 7}), 0);
+  EXPECT_DOUBLE_EQ(fem::von_mises({0, 0, 0, -30, 0, 0}), 30);
+  EXPECT_DOUBLE_EQ(fem::von_mises({5, 0, 0, 35, 0, 5}), 30); // a pressure adds nothing
+  EXPECT_EQ(fem::von_mises({7, 0, 0, 7, 0, 7}), 0);
   for (const std::size_t shear : {1U, 2U, 4U}) {
-    SymmetricBlock stress{};
+    linalg::SymmetricBlock stress{};
     stress[shear] = -10;
-    EXPECT_DOUBLE_EQ(von_mises(stress), 10 * std::sqrt(3));
+    EXPECT_DOUBLE_EQ(fem::von_mises(stress), 10 * std::sqrt(3));
   }
 }
 
 TEST(SolidAssembly, WhatItCannotUseIsRefusedByName) {
-  const auto refuses = [](const TetMesh& mesh, const std::vector<SolidMaterial>& materials,
+  const auto refuses = [](const tetrahedra::TetMesh& mesh,
+                          const std::vector<fem::SolidMaterial>& materials,
                           const std::string& expected) {
     try {
-      solid_elements(mesh, materials);
+      fem::solid_elements(mesh, materials);
       ADD_FAILURE() << "took it, expected: " << expected;
     } catch (const Error& error) {
       EXPECT_NE(std::string(error.what()).find(expected), std::string::npos) << error.what();
     }
   };
-  TetMesh mesh = distorted(true, false);
+  tetrahedra::TetMesh mesh = distorted(true, false);
   mesh.points[mesh.middles[0][3]].x += 0.01;
   refuses(mesh, two, "tetrahedron 0 has a node away from the middle");
   mesh = distorted(false, true);
@@ -370,9 +375,9 @@ TEST(SolidAssembly, WhatItCannotUseIsRefusedByName) {
 
 /// A spring along x between two nodes of a solid: its stiffness adds.
 TEST(SolidAssembly, SpringsAndSolidsAdd) {
-  const TetMesh mesh = distorted(true, false);
-  const auto elements = solid_elements(mesh, two);
-  Model model;
+  const tetrahedra::TetMesh mesh = distorted(true, false);
+  const auto elements = fem::solid_elements(mesh, two);
+  model::Model model;
   model.materials.resize(1);
   for (const Vec3& p : mesh.points)
     model.nodes.push_back({.position = p, .mass = 1});
@@ -383,21 +388,21 @@ TEST(SolidAssembly, SpringsAndSolidsAdd) {
                              .rest = norm(mesh.points[i] - mesh.points[i + 1])});
   std::vector<std::uint8_t> fixed(3 * mesh.points.size());
   fixed[0] = fixed[1] = fixed[2] = 1;
-  const StiffnessMatrix both =
-      sum(solid_stiffness(mesh, elements, fixed), stiffness_matrix(model, fixed));
+  const linalg::StiffnessMatrix both =
+      fem::sum(fem::solid_stiffness(mesh, elements, fixed), fem::stiffness_matrix(model, fixed));
   std::mt19937 random(1);
   std::uniform_real_distribution<double> any(-1, 1);
   std::vector<double> u(fixed.size()), f(u.size()), g(u.size()), x, y(both.order());
   for (std::size_t axis = 3; axis < u.size(); ++axis)
     x.push_back(u[axis] = any(random));
-  multiply(both, x, y);
-  multiply_solid(mesh, elements, u, f);
-  multiply_stiffness(model, u, g);
+  linalg::multiply(both, x, y);
+  fem::multiply_solid(mesh, elements, u, f);
+  fem::multiply_stiffness(model, u, g);
   for (std::size_t r = 0; r < y.size(); ++r)
     EXPECT_NEAR(y[r], f[r + 3] + g[r + 3], 1e-13 * largest(f));
   EXPECT_GT(largest(g), 0.01 * largest(f));
-  EXPECT_THROW(sum(both, stiffness_matrix(model)), Error);
+  EXPECT_THROW(fem::sum(both, fem::stiffness_matrix(model)), Error);
 }
 
 } // namespace
-} // namespace gewebe
+} // namespace gewebe::test

@@ -29,32 +29,34 @@
 #include <utility>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::test {
 namespace {
 
 using Numbers = std::vector<double>;
 
 struct Kind {
-  SolidLaw law;
+  integrator::SolidLaw law;
   bool quadratic;
 };
 std::string name(const Kind& kind) {
-  return std::string(kind.law == SolidLaw::corotational ? "corotational" : "neo_hookean") +
+  return std::string(kind.law == integrator::SolidLaw::corotational ? "corotational"
+                                                                    : "neo_hookean") +
          (kind.quadratic ? "_quadratic" : "_linear");
 }
 
 class SolidMotionOf : public testing::TestWithParam<Kind> {
 protected:
-  static TetMesh mesh(TetMesh of = test::box_tetrahedra(3, 2, 2, 5)) {
+  static tetrahedra::TetMesh mesh(tetrahedra::TetMesh of = test::box_tetrahedra(3, 2, 2, 5)) {
     if (GetParam().quadratic)
-      make_quadratic(of);
+      tetrahedra::make_quadratic(of);
     return of;
   }
-  static SolidMotion body(const TetMesh& mesh, SolidMotionOptions options = {}) {
+  static integrator::SolidMotion body(const tetrahedra::TetMesh& mesh,
+                                      integrator::SolidMotionOptions options = {}) {
     options.law = GetParam().law;
     return {mesh, materials(), options};
   }
-  static std::vector<SolidMaterial> materials() { return {{2e4, 0.45, 1e-3}}; }
+  static std::vector<fem::SolidMaterial> materials() { return {{2e4, 0.45, 1e-3}}; }
 };
 
 Numbers random_numbers(std::size_t count, double by, std::mt19937& random) {
@@ -65,14 +67,14 @@ Numbers random_numbers(std::size_t count, double by, std::mt19937& random) {
   return numbers;
 }
 
-std::vector<std::uint8_t> held_end(const TetMesh& mesh) {
+std::vector<std::uint8_t> held_end(const tetrahedra::TetMesh& mesh) {
   std::vector<std::uint8_t> held;
   for (const Vec3& p : mesh.points)
     held.insert(held.end(), 3, p.x == 0 ? 1 : 0);
   return held;
 }
 
-double energy(const SolidMotion& body) {
+double energy(const integrator::SolidMotion& body) {
   return body.kinetic_energy() + body.potential_energy();
 }
 
@@ -80,7 +82,7 @@ double largest(const Numbers& a) {
   return test::largest_difference(a, Numbers(a.size()));
 }
 
-std::array<Vec3, 2> momentum(const SolidMotion& body) {
+std::array<Vec3, 2> momentum(const integrator::SolidMotion& body) {
   std::array<Vec3, 2> sum{};
   for (std::size_t i = 0; i < body.masses().size(); ++i) {
     const auto x = body.places().subspan(3 * i, 3), v = body.velocity().subspan(3 * i, 3);
@@ -92,16 +94,17 @@ std::array<Vec3, 2> momentum(const SolidMotion& body) {
 }
 
 TEST_P(SolidMotionOf, EnergyNeverGrowsWithoutWork) {
-  const bool slow = GetParam().law != SolidLaw::corotational && GetParam().quadratic;
-  const TetMesh m = mesh(slow ? test::box_tetrahedra(1, 1, 1, 1) : test::distorted_box());
+  const bool slow = GetParam().law != integrator::SolidLaw::corotational && GetParam().quadratic;
+  const tetrahedra::TetMesh m =
+      mesh(slow ? test::box_tetrahedra(1, 1, 1, 1) : test::distorted_box());
   std::mt19937 random(1);
   for (const bool held : {false, true})
     for (const double h : {1e-5, 1e-3, 1.0 / 60, 0.1, 1.0}) {
-      SolidMotionOptions options;
+      integrator::SolidMotionOptions options;
       options.max_rounds = 1 + static_cast<int>(random() % 4); // unfinished steps as well
       options.damping = random() % 2 == 0 ? 0 : 1e-3;
       options.drag = random() % 2 == 0 ? 0 : 2;
-      SolidMotion moving = body(m, options);
+      integrator::SolidMotion moving = body(m, options);
       const std::size_t axes = 3 * m.points.size();
       if (held)
         moving.hold(held_end(m));
@@ -116,7 +119,10 @@ TEST_P(SolidMotionOf, EnergyNeverGrowsWithoutWork) {
       moving.set_state(u, v);
       double before = energy(moving);
       const double scale = std::abs(before) + moving.kinetic_energy() + moving.elastic_energy();
-      for (int n = 0; n < (slow ? 3 : GetParam().law == SolidLaw::corotational ? 60 : 8); ++n) {
+      for (int n = 0; n < (slow                                                   ? 3
+                           : GetParam().law == integrator::SolidLaw::corotational ? 60
+                                                                                  : 8);
+           ++n) {
         (void)moving.step(h, {});
         const double after = energy(moving);
         ASSERT_LE(after, before + 1e-10 * scale) << "step " << n << " of " << h;
@@ -126,15 +132,15 @@ TEST_P(SolidMotionOf, EnergyNeverGrowsWithoutWork) {
 }
 
 TEST_P(SolidMotionOf, FreeBodiesKeepTheirMomentum) {
-  const TetMesh m = mesh();
+  const tetrahedra::TetMesh m = mesh();
   const std::size_t axes = 3 * m.points.size();
   std::array<double, 2> turned{};
   for (const int half : {0, 1}) {
     const int steps = half == 0 ? 10 : 20;
-    SolidMotionOptions options;
+    integrator::SolidMotionOptions options;
     options.tolerance = 1e-6;
     options.max_rounds = 60;
-    SolidMotion moving = body(m, options);
+    integrator::SolidMotion moving = body(m, options);
     std::mt19937 random(2);
     Numbers v = random_numbers(axes, 1, random);
     for (std::size_t i = 0; i < m.points.size(); ++i) { // and a spin
@@ -155,8 +161,8 @@ TEST_P(SolidMotionOf, FreeBodiesKeepTheirMomentum) {
 }
 
 TEST_P(SolidMotionOf, ALoadGivesItsMomentum) {
-  const TetMesh m = mesh();
-  SolidMotion moving = body(m);
+  const tetrahedra::TetMesh m = mesh();
+  integrator::SolidMotion moving = body(m);
   Numbers load(3 * m.points.size());
   load[1] = 1000;
   moving.set_load(load);
@@ -167,13 +173,13 @@ TEST_P(SolidMotionOf, ALoadGivesItsMomentum) {
 }
 
 TEST_P(SolidMotionOf, ComesToRestWhereStaticsSays) {
-  const TetMesh m = mesh(test::box_tetrahedra(5, 2, 2, 5));
-  const std::vector<SolidElement> elements = solid_elements(m, materials());
+  const tetrahedra::TetMesh m = mesh(test::box_tetrahedra(5, 2, 2, 5));
+  const std::vector<fem::SolidElement> elements = fem::solid_elements(m, materials());
   const std::vector<std::uint8_t> held = held_end(m);
-  SolidMotionOptions options;
+  integrator::SolidMotionOptions options;
   options.tolerance = 1e-6;
   options.max_rounds = 100;
-  SolidMotion moving = body(m, options);
+  integrator::SolidMotion moving = body(m, options);
   moving.hold(held);
   const auto rest = [&](const Numbers& load) {
     moving.set_load(load);
@@ -181,22 +187,23 @@ TEST_P(SolidMotionOf, ComesToRestWhereStaticsSays) {
       (void)moving.step(1, {});
     return moving.displacement();
   };
-  if (GetParam().law == SolidLaw::hyperelastic) {
-    SolidVector load;
+  if (GetParam().law == integrator::SolidLaw::hyperelastic) {
+    fit::SolidVector load;
     load.axes = Numbers(held.size());
     for (std::size_t axis = 2; axis < load.axes.size(); axis += 3)
       load.axes[axis] = -9810 * moving.masses()[axis / 3];
     const Numbers u = rest(load.axes),
-                  expected = hyperelastic_statics(m, elements, held, {}, load).displacement.axes;
+                  expected =
+                      fit::hyperelastic_statics(m, elements, held, {}, load).displacement.axes;
     EXPECT_GT(largest(expected), 0.5);
     EXPECT_LT(test::largest_difference(u, expected), 1e-5 * largest(expected));
   }
   Numbers small(held.size());
   for (std::size_t axis = 2; axis < small.size(); axis += 3)
     small[axis] = -1e-3 * moving.masses()[axis / 3];
-  const StiffnessMatrix k = solid_stiffness(m, elements, held);
+  const linalg::StiffnessMatrix k = fem::solid_stiffness(m, elements, held);
   Numbers expected(held.size());
-  solve_axes(k, Factor(k, {}), small, expected);
+  linalg::solve_axes(k, linalg::Factor(k, {}), small, expected);
   EXPECT_LT(test::largest_difference(rest(small), expected), 1e-5 * largest(expected));
   // And what holds it carries the load.
   double carried = 0, weight = 0;
@@ -210,14 +217,14 @@ TEST_P(SolidMotionOf, ComesToRestWhereStaticsSays) {
 }
 
 TEST_P(SolidMotionOf, IsOfFirstOrderAndTheQuickWayGoesWhereTheReferenceDoes) {
-  const TetMesh m = mesh();
+  const tetrahedra::TetMesh m = mesh();
   const auto end = [&](int steps, bool reference, double tolerance) {
-    SolidMotionOptions options;
+    integrator::SolidMotionOptions options;
     options.reference = reference;
     options.tolerance = tolerance;
     options.max_rounds = 60;
     options.damping = 1e-4;
-    SolidMotion moving = body(m, options);
+    integrator::SolidMotion moving = body(m, options);
     moving.hold(held_end(m));
     Numbers load(3 * m.points.size());
     for (std::size_t axis = 2; axis < load.size(); axis += 3)
@@ -230,14 +237,14 @@ TEST_P(SolidMotionOf, IsOfFirstOrderAndTheQuickWayGoesWhereTheReferenceDoes) {
   const Numbers a = end(8, false, 1e-7), b = end(16, false, 1e-7), c = end(32, false, 1e-7);
   EXPECT_NEAR(test::largest_difference(a, b) / test::largest_difference(b, c), 2, 0.3);
   EXPECT_LT(test::largest_difference(a, end(8, true, 0.1)), 1e-5 * largest(a));
-  EXPECT_LT(test::largest_difference(a, end(8, false, SolidMotionOptions().tolerance)),
+  EXPECT_LT(test::largest_difference(a, end(8, false, integrator::SolidMotionOptions().tolerance)),
             0.02 * largest(a));
 }
 
 /// A step in parts from afar: each round whose model holds has less energy than the last one, by
 /// tangents or the constant matrix, and rounds end where the reference does.
 TEST_P(SolidMotionOf, RoundsOfAStepInPartsLowerTheEnergyToItsLeast) {
-  const TetMesh m = mesh();
+  const tetrahedra::TetMesh m = mesh();
   const std::size_t axes = 3 * m.points.size();
   const double h = 0.01;
   Numbers load(axes);
@@ -245,22 +252,22 @@ TEST_P(SolidMotionOf, RoundsOfAStepInPartsLowerTheEnergyToItsLeast) {
     if (m.points[i].x == 15)
       load[3 * i + 2] = -2.5e4; // bends it by more than its height in a step
   const auto made = [&](bool reference) {
-    SolidMotionOptions options;
+    integrator::SolidMotionOptions options;
     options.reference = reference;
-    SolidMotion moving = body(m, options);
+    integrator::SolidMotion moving = body(m, options);
     moving.hold(held_end(m));
     moving.set_load(load);
     return moving;
   };
-  SolidMotion reference = made(true);
+  integrator::SolidMotion reference = made(true);
   (void)reference.step(h, {});
   for (const bool sharp : {false, true}) {
-    SolidMotion moving = made(false);
+    integrator::SolidMotion moving = made(false);
     moving.begin_step(h, {});
     const auto energy = [&] {
       double sum = 0;
       const std::span<const double> at = moving.iterate();
-      SolidMotion there = made(false);
+      integrator::SolidMotion there = made(false);
       Numbers u(at.begin(), at.end());
       for (std::size_t axis = 0; axis < axes; ++axis) {
         u[axis] -= moving.places()[axis];
@@ -300,9 +307,9 @@ TEST_P(SolidMotionOf, RoundsOfAStepInPartsLowerTheEnergyToItsLeast) {
 /// As long as matrix_version() is the same, unit_responses() are: behind tangents, steps of another
 /// length, and steps without contact in which other nodes are held. And the iterate moves by them.
 TEST_P(SolidMotionOf, ResponsesAreTheSameUntilTheMatrixIsAnother) {
-  const TetMesh m = mesh();
+  const tetrahedra::TetMesh m = mesh();
   const std::size_t axes = 3 * m.points.size();
-  SolidMotion moving = body(m, {});
+  integrator::SolidMotion moving = body(m, {});
   moving.hold(held_end(m));
   Numbers load(axes);
   for (std::size_t i = 0; i < m.points.size(); ++i)
@@ -366,16 +373,16 @@ TEST_P(SolidMotionOf, ResponsesAreTheSameUntilTheMatrixIsAnother) {
 
 /// Nodes anywhere, elements inside out: all of them turn right again, and lose their energy.
 TEST_P(SolidMotionOf, ScrambledBodiesFindBack) {
-  const TetMesh m = mesh(test::box_tetrahedra(2, 1, 1, 5));
+  const tetrahedra::TetMesh m = mesh(test::box_tetrahedra(2, 1, 1, 5));
   const std::size_t axes = 3 * m.points.size();
   std::mt19937 random(7);
-  SolidMotionOptions options;
+  integrator::SolidMotionOptions options;
   options.max_rounds = 20;
-  const bool corotational = GetParam().law == SolidLaw::corotational;
+  const bool corotational = GetParam().law == integrator::SolidLaw::corotational;
   const int states = GetParam().quadratic ? (corotational ? 12 : 1) : 40;
   int right = 0;
   for (int n = 0; n < states; ++n) {
-    SolidMotion moving = body(m, options);
+    integrator::SolidMotion moving = body(m, options);
     Numbers u = random_numbers(axes, 5, random);
     if (n % 3 == 1) // flat
       for (std::size_t axis = 0; axis < axes; axis += 3)
@@ -394,16 +401,16 @@ TEST_P(SolidMotionOf, ScrambledBodiesFindBack) {
 }
 
 TEST_P(SolidMotionOf, ItsElasticEnergyIsThatOfItsPlaces) {
-  const TetMesh m = mesh();
+  const tetrahedra::TetMesh m = mesh();
   std::mt19937 random(4);
-  SolidMotionOptions options;
+  integrator::SolidMotionOptions options;
   options.damping = 0.01;
-  SolidMotion moving = body(m, options);
+  integrator::SolidMotion moving = body(m, options);
   moving.set_state(random_numbers(3 * m.points.size(), 0.3, random),
                    random_numbers(3 * m.points.size(), 300, random));
   for (int n = 0; n < 3; ++n) {
     (void)moving.step(0.002, {});
-    SolidMotion standing = body(m);
+    integrator::SolidMotion standing = body(m);
     standing.set_state(moving.displacement(), Numbers(3 * m.points.size()));
     EXPECT_GT(moving.elastic_energy(), 0);
     EXPECT_NEAR(moving.elastic_energy(), standing.elastic_energy(),
@@ -412,14 +419,14 @@ TEST_P(SolidMotionOf, ItsElasticEnergyIsThatOfItsPlaces) {
 }
 
 TEST_P(SolidMotionOf, SameBytesOnAnyThreadsAndLevel) {
-  const TetMesh m = mesh(test::box_tetrahedra(5, 3, 3, 2));
+  const tetrahedra::TetMesh m = mesh(test::box_tetrahedra(5, 3, 3, 2));
   const auto end = [&](int threads, CpuLevel cpu) {
     Context context;
     context.threads = threads;
     context.cpu = cpu;
-    SolidMotionOptions options;
+    integrator::SolidMotionOptions options;
     options.damping = 1e-3;
-    SolidMotion moving = body(m, options);
+    integrator::SolidMotion moving = body(m, options);
     moving.hold(held_end(m));
     std::mt19937 random(3);
     moving.set_load(random_numbers(3 * m.points.size(), 500, random));
@@ -433,11 +440,11 @@ TEST_P(SolidMotionOf, SameBytesOnAnyThreadsAndLevel) {
 }
 
 TEST_P(SolidMotionOf, HeldNodesAreMovedAndPullTheRest) {
-  const TetMesh m = mesh();
-  SolidMotionOptions options;
+  const tetrahedra::TetMesh m = mesh();
+  integrator::SolidMotionOptions options;
   options.tolerance = 1e-6;
   options.max_rounds = 60;
-  SolidMotion moving = body(m, options);
+  integrator::SolidMotion moving = body(m, options);
   const std::vector<std::uint8_t> held = held_end(m);
   moving.hold(held);
   Numbers target(held.size());
@@ -457,8 +464,8 @@ TEST_P(SolidMotionOf, HeldNodesAreMovedAndPullTheRest) {
 
 /// Secants of earlier steps must not influence the steps after set_state().
 TEST_P(SolidMotionOf, SetStateDiscardsTheSecants) {
-  const TetMesh m = mesh();
-  SolidMotion fresh = body(m), used = body(m);
+  const tetrahedra::TetMesh m = mesh();
+  integrator::SolidMotion fresh = body(m), used = body(m);
   std::mt19937 random(5);
   const Numbers none(3 * m.points.size()), load = random_numbers(none.size(), 3000, random),
                                            u = random_numbers(none.size(), 0.4, random),
@@ -467,7 +474,7 @@ TEST_P(SolidMotionOf, SetStateDiscardsTheSecants) {
   for (int n = 0; n < 6; ++n)
     (void)used.step(0.01, {});
   used.set_load(none);
-  for (SolidMotion* moving : {&fresh, &used}) {
+  for (integrator::SolidMotion* moving : {&fresh, &used}) {
     moving->set_state(u, v);
     for (int n = 0; n < 3; ++n)
       (void)moving->step(0.01, {});
@@ -477,21 +484,21 @@ TEST_P(SolidMotionOf, SetStateDiscardsTheSecants) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Laws, SolidMotionOf,
-                         testing::Values(Kind{SolidLaw::corotational, false},
-                                         Kind{SolidLaw::corotational, true},
-                                         Kind{SolidLaw::hyperelastic, false},
-                                         Kind{SolidLaw::hyperelastic, true}),
-                         [](const auto& of) { return name(of.param); });
+                         testing::Values(Kind{integrator::SolidLaw::corotational, false},
+                                         Kind{integrator::SolidLaw::corotational, true},
+                                         Kind{integrator::SolidLaw::hyperelastic, false},
+                                         Kind{integrator::SolidLaw::hyperelastic, true}),
+                         [](const auto& of) { return gewebe::test::name(of.param); });
 
 /// Where a body is pressed so that it wants to buckle, its energy falls faster than straight on,
 /// and backward Euler gives a motion that way more than that: h²/2 times the (negative) stiffness
 /// times its energy a step. What is added must be taken back.
 TEST(SolidMotion, EnergyThatBucklingWouldAddIsTakenBack) {
-  const TetMesh m = test::box_tetrahedra(20, 1, 1, 5);
-  SolidMotionOptions options;
+  const tetrahedra::TetMesh m = test::box_tetrahedra(20, 1, 1, 5);
+  integrator::SolidMotionOptions options;
   options.tolerance = 1e-8;
   options.max_rounds = 60;
-  SolidMotion moving(m, std::vector<SolidMaterial>{{2e4, 0, 1e-3}}, options);
+  integrator::SolidMotion moving(m, std::vector<fem::SolidMaterial>{{2e4, 0, 1e-3}}, options);
   std::vector<std::uint8_t> held;
   Numbers u, v;
   for (const Vec3& p : m.points) {
@@ -515,12 +522,12 @@ TEST(SolidMotion, EnergyThatBucklingWouldAddIsTakenBack) {
 
 /// Speeds from which the energy is taken that they would add are not those of the body as a whole.
 TEST(SolidMotion, UnfinishedStepsKeepTheMomentumOfFreeBodies) {
-  const TetMesh m = test::box_tetrahedra(3, 2, 2, 5);
-  SolidMotionOptions options;
+  const tetrahedra::TetMesh m = test::box_tetrahedra(3, 2, 2, 5);
+  integrator::SolidMotionOptions options;
   options.max_rounds = 1;
   for (std::uint32_t seed = 0; seed < 20; ++seed) {
     std::mt19937 random(seed);
-    SolidMotion moving(m, std::vector<SolidMaterial>{{2e4, 0.45, 1e-3}}, options);
+    integrator::SolidMotion moving(m, std::vector<fem::SolidMaterial>{{2e4, 0.45, 1e-3}}, options);
     Numbers load = random_numbers(3 * m.points.size(), 3e5 * moving.masses()[20], random);
     moving.set_load(load);
     moving.set_state(random_numbers(load.size(), 0.5, random),
@@ -541,12 +548,12 @@ TEST(SolidMotion, UnfinishedStepsKeepTheMomentumOfFreeBodies) {
 
 /// The moment of what a backward Euler step leaves unbalanced is that of no outer force.
 TEST(SolidMotion, UnfinishedStepsKeepTheAngularMomentumOfFreeBodies) {
-  const TetMesh m = test::box_tetrahedra(3, 2, 2, 5);
-  SolidMotionOptions options;
+  const tetrahedra::TetMesh m = test::box_tetrahedra(3, 2, 2, 5);
+  integrator::SolidMotionOptions options;
   options.max_rounds = 1;
   for (std::uint32_t seed = 0; seed < 10; ++seed) {
     std::mt19937 random(seed);
-    SolidMotion moving(m, std::vector<SolidMaterial>{{2e4, 0.45, 1e-3}}, options);
+    integrator::SolidMotion moving(m, std::vector<fem::SolidMaterial>{{2e4, 0.45, 1e-3}}, options);
     Numbers v = random_numbers(3 * m.points.size(), 100, random);
     const Numbers axis = random_numbers(3, 20, random);
     const Vec3 spin{axis[0], axis[1], axis[2]};
@@ -602,22 +609,23 @@ Swings swings(const Numbers& values, double h, double middle) {
 }
 
 TEST_P(SolidMotionOf, SwingsDecayByTheDampingRatio) {
-  TetMesh flat = test::box_tetrahedra(4, 1, 1, 5); // so that it swings up and down alone
+  tetrahedra::TetMesh flat =
+      test::box_tetrahedra(4, 1, 1, 5); // so that it swings up and down alone
   for (Vec3& p : flat.points)
     p.y *= 2;
-  const TetMesh m = mesh(flat);
+  const tetrahedra::TetMesh m = mesh(flat);
   Numbers load(3 * m.points.size());
   std::size_t tip = 0;
   for (std::size_t i = 0; i < m.points.size(); ++i)
     if (norm(m.points[i] - Vec3{20, 10, 5}) < 1e-9)
       tip = i;
   const auto swing = [&](double damping, double drag, double h) {
-    SolidMotionOptions options;
+    integrator::SolidMotionOptions options;
     options.tolerance = 1e-6;
     options.max_rounds = 40;
     options.damping = damping;
     options.drag = drag;
-    SolidMotion moving = body(m, options);
+    integrator::SolidMotion moving = body(m, options);
     moving.hold(held_end(m));
     for (std::size_t axis = 2; axis < load.size(); axis += 3)
       load[axis] = 500 * moving.masses()[axis / 3];
@@ -637,7 +645,8 @@ TEST_P(SolidMotionOf, SwingsDecayByTheDampingRatio) {
   const Swings alone = swing(0, 0, h); // decays as the integration makes it
   const double omega = 2 * std::numbers::pi * alone.frequency, ratio = 0.05;
   EXPECT_NEAR(alone.decay, omega * omega * h / 2, 0.1 * omega * omega * h / 2);
-  EXPECT_NEAR(swing(damping_per_stiffness(ratio, alone.frequency), 0, h).decay - alone.decay,
+  EXPECT_NEAR(swing(integrator::damping_per_stiffness(ratio, alone.frequency), 0, h).decay -
+                  alone.decay,
               ratio * omega, 0.1 * ratio * omega);
   EXPECT_NEAR(swing(0, 2 * ratio * omega, h).decay - alone.decay, ratio * omega,
               0.1 * ratio * omega);
@@ -646,9 +655,9 @@ TEST_P(SolidMotionOf, SwingsDecayByTheDampingRatio) {
 /// The height of a node of a silicone beam that is let go, straight, and falls.
 Swings falling_beam(const test::Solid& beam, const Numbers& load, double measured, double middle,
                     double h, int steps) {
-  SolidMotionOptions options;
-  options.damping = damping_per_stiffness(0.02, measured);
-  SolidMotion moving(beam.mesh, beam.materials, options);
+  integrator::SolidMotionOptions options;
+  options.damping = integrator::damping_per_stiffness(0.02, measured);
+  integrator::SolidMotion moving(beam.mesh, beam.materials, options);
   moving.hold(beam.fixed);
   moving.set_load(load);
   const std::size_t node = beam.node_at({100, 0, 30});
@@ -669,7 +678,7 @@ TEST(SolidMotion, ASiliconeBeamHasItsMeasuredFrequency) {
 /// The same beam with 52 g on the upper edge of its free end (as test::silicone_beam): there the
 /// last elements, of 3 mm, are so much heavier.
 TEST(SolidMotion, ALoadedSiliconeBeamHasItsMeasuredFrequency) {
-  TetMesh mesh = test::box_tetrahedra(10, 3, 3, 10);
+  tetrahedra::TetMesh mesh = test::box_tetrahedra(10, 3, 3, 10);
   for (Vec3& p : mesh.points)
     p.x = p.x == 90 ? 97 : p.x;
   for (const Tetrahedron& t : mesh.tetrahedra) {
@@ -684,18 +693,19 @@ TEST(SolidMotion, ALoadedSiliconeBeamHasItsMeasuredFrequency) {
   test::Solid beam{mesh, true, {{263824, 0.499, silicone}, {263824, 0.499, heavy}}};
   for (std::size_t axis = 0; axis < 3; ++axis)
     beam.hold(axis, [](const Vec3& p) { return p.x == 0; });
-  const Numbers load = gravity_load(beam.mesh, beam.materials, beam.elements, {0, 0, -9807.09});
+  const Numbers load =
+      fem::gravity_load(beam.mesh, beam.materials, beam.elements, {0, 0, -9807.09});
   EXPECT_NEAR(falling_beam(beam, load, 4.37, -17.3, 1.0 / 300, 190).frequency, 4.37, 0.05 * 4.37);
 }
 
 /// The energy is K (V - V₀)²/(2 |V₀|), and the forces are its negative gradient.
 TEST(SolidMotion, ForcesOfEnclosedVolumesAreTheEnergyGradient) {
-  const TriangleMesh cube = boundary(test::box_tetrahedra(1, 1, 1, 3)).mesh;
+  const TriangleMesh cube = tetrahedra::boundary(test::box_tetrahedra(1, 1, 1, 3)).mesh;
   Numbers rest;
   for (const Vec3& p : cube.points)
     rest.insert(rest.end(), {p.x, p.y, p.z});
   constexpr double bulk = 700;
-  MotionVolumes volumes(cube.triangles, rest, bulk);
+  integrator::MotionVolumes volumes(cube.triangles, rest, bulk);
   const auto at = [&](const Numbers& places) {
     Numbers forces(places.size());
     return std::pair(volumes.evaluate(places, forces), forces);
@@ -707,7 +717,7 @@ TEST(SolidMotion, ForcesOfEnclosedVolumesAreTheEnergyGradient) {
   const double more = 27 * (1.331 - 1);
   EXPECT_NEAR(at(wider).first, bulk * more * more / (2 * 27), 1e-9 * bulk);
   std::mt19937 random(3);
-  add(wider, 1, random_numbers(rest.size(), 0.2, random));
+  integrator::add(wider, 1, random_numbers(rest.size(), 0.2, random));
   const Numbers forces = at(wider).second;
   for (std::size_t axis = 0; axis < rest.size(); ++axis) {
     constexpr double step = 1e-5;
@@ -720,7 +730,7 @@ TEST(SolidMotion, ForcesOfEnclosedVolumesAreTheEnergyGradient) {
 
 /// The order in which the limiter reduces speeds.
 TEST(SolidMotion, EnergyLimitTakesDeformationThenRotationThenTranslation) {
-  MotionBody body;
+  integrator::MotionBody body;
   const std::vector<Vec3> corners{{1, 0, 0}, {-1, 0, 0}, {0, 1, 0}, {0, -1, 0}};
   for (const Vec3& p : corners) {
     body.rest.insert(body.rest.end(), {p.x, p.y, p.z});
@@ -729,7 +739,7 @@ TEST(SolidMotion, EnergyLimitTakesDeformationThenRotationThenTranslation) {
     body.in_elements.push_back(1);
   }
   const Numbers none(body.axes());
-  MotionState state{body.rest, none, none, std::vector<std::uint8_t>(body.axes())};
+  integrator::MotionState state{body.rest, none, none, std::vector<std::uint8_t>(body.axes())};
   Numbers moving = none, turning = none, inner = none;
   for (std::size_t i = 0; i < corners.size(); ++i) {
     moving[3 * i + 2] = 3;              // m/2 v² of all: 36
@@ -739,38 +749,38 @@ TEST(SolidMotion, EnergyLimitTakesDeformationThenRotationThenTranslation) {
   }
   const auto speeds = [&](double of_inner, double of_turning, double of_moving) {
     Numbers all = none;
-    add(all, of_inner, inner);
-    add(all, of_turning, turning);
-    add(all, of_moving, moving);
+    integrator::add(all, of_inner, inner);
+    integrator::add(all, of_turning, turning);
+    integrator::add(all, of_moving, moving);
     return all;
   };
   const auto limited = [&](double most) {
     state.velocity = speeds(1, 1, 1);
-    EXPECT_TRUE(limit_energy(body, state, 0, most, 0));
+    EXPECT_TRUE(integrator::limit_energy(body, state, 0, most, 0));
     return state.velocity;
   };
-  EXPECT_NEAR(motion_energy(body, speeds(1, 1, 1)), 102, 1e-12);
+  EXPECT_NEAR(integrator::motion_energy(body, speeds(1, 1, 1)), 102, 1e-12);
   EXPECT_LT(test::largest_difference(limited(101), speeds(std::sqrt(0.5), 1, 1)), 1e-12);
   EXPECT_LT(test::largest_difference(limited(84), speeds(0, 0.5 * std::sqrt(3.0), 1)), 1e-12);
-  EXPECT_NEAR(motion_energy(body, state.velocity), 84, 1e-12);
+  EXPECT_NEAR(integrator::motion_energy(body, state.velocity), 84, 1e-12);
   EXPECT_LT(test::largest_difference(limited(9), speeds(0, 0, 0.5)), 1e-12);
   state.velocity = speeds(1, 1, 1);
-  EXPECT_FALSE(limit_energy(body, state, 0, 102, 1e-9));
+  EXPECT_FALSE(integrator::limit_energy(body, state, 0, 102, 1e-9));
   EXPECT_EQ(state.velocity, speeds(1, 1, 1));
 }
 
 TEST(SolidMotion, RefusesWhatItCantDo) {
-  TetMesh m = test::box_tetrahedra(1, 1, 1);
-  const std::vector<SolidMaterial> materials{{2e4, 0.45, 1e-3}};
-  SolidMotionOptions options;
+  tetrahedra::TetMesh m = test::box_tetrahedra(1, 1, 1);
+  const std::vector<fem::SolidMaterial> materials{{2e4, 0.45, 1e-3}};
+  integrator::SolidMotionOptions options;
   options.damping = std::nan("");
-  EXPECT_THROW(SolidMotion(m, materials, options), Error);
+  EXPECT_THROW(integrator::SolidMotion(m, materials, options), Error);
   options.damping = 0;
   options.tolerance = 0;
-  EXPECT_THROW(SolidMotion(m, materials, options), Error);
+  EXPECT_THROW(integrator::SolidMotion(m, materials, options), Error);
   m.points.push_back({9, 9, 9});
-  EXPECT_THROW(SolidMotion(m, materials, {}), Error);
+  EXPECT_THROW(integrator::SolidMotion(m, materials, {}), Error);
 }
 
 } // namespace
-} // namespace gewebe
+} // namespace gewebe::test

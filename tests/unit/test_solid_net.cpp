@@ -23,7 +23,7 @@
 #include <utility>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::test {
 namespace {
 
 using test::one_thread, test::settle;
@@ -39,21 +39,21 @@ double largest_difference(std::span<const double> a, std::span<const double> b) 
 // ---- the body itself
 
 struct Kind {
-  SolidLaw law;
+  integrator::SolidLaw law;
   bool quadratic;
 };
 
 /// A box of tetrahedra and a chain of three nodes that hangs on one of its corners, with a spring
 /// between two other corners.
 struct Chained {
-  TetMesh mesh;
-  std::vector<SolidSpring> springs;
+  tetrahedra::TetMesh mesh;
+  std::vector<integrator::SolidSpring> springs;
   Numbers masses, drag;
   std::size_t first = 0; ///< node of the chain
 
   explicit Chained(bool quadratic) : mesh(test::box_tetrahedra(2, 2, 2, 5)) {
     if (quadratic)
-      make_quadratic(mesh);
+      tetrahedra::make_quadratic(mesh);
     first = mesh.points.size();
     masses.resize(first);
     const auto corner = static_cast<std::uint32_t>(std::ranges::find(mesh.points, Vec3{10, 10, 0}) -
@@ -69,15 +69,16 @@ struct Chained {
     springs.push_back({0, 2, 800, 1, 12}); // not at rest
     drag.assign(mesh.points.size(), 0);
   }
-  SolidMotion moving(const SolidMotionOptions& options) const {
-    return {mesh, std::vector<SolidMaterial>{{2e4, 0.4, 1e-3}}, {springs, masses, drag}, options};
+  integrator::SolidMotion moving(const integrator::SolidMotionOptions& options) const {
+    return {
+        mesh, std::vector<fem::SolidMaterial>{{2e4, 0.4, 1e-3}}, {springs, masses, drag}, options};
   }
 };
 
 class SolidNetOf : public testing::TestWithParam<Kind> {
 protected:
-  static SolidMotionOptions sure() {
-    SolidMotionOptions options;
+  static integrator::SolidMotionOptions sure() {
+    integrator::SolidMotionOptions options;
     options.law = GetParam().law;
     options.tolerance = 1e-8;
     options.max_rounds = 200;
@@ -85,11 +86,11 @@ protected:
   }
 };
 
-double energy(const SolidMotion& body) {
+double energy(const integrator::SolidMotion& body) {
   return body.kinetic_energy() + body.potential_energy();
 }
 
-std::array<Vec3, 2> momentum(const SolidMotion& body) {
+std::array<Vec3, 2> momentum(const integrator::SolidMotion& body) {
   std::array<Vec3, 2> sum{};
   for (std::size_t i = 0; i < body.masses().size(); ++i) {
     const Vec3 p = body.masses()[i] * vector_at(body.velocity(), i);
@@ -103,10 +104,10 @@ std::array<Vec3, 2> momentum(const SolidMotion& body) {
 TEST_P(SolidNetOf, TheQuickWayGoesWhereTheReferenceDoes) {
   const Chained body(GetParam().quadratic);
   const auto end = [&](bool reference) {
-    SolidMotionOptions options = sure();
+    integrator::SolidMotionOptions options = sure();
     options.reference = reference;
     options.damping = 1e-4;
-    SolidMotion moving = body.moving(options);
+    integrator::SolidMotion moving = body.moving(options);
     std::vector<std::uint8_t> held;
     Numbers load;
     for (std::size_t i = 0; i < body.mesh.points.size(); ++i) {
@@ -132,7 +133,7 @@ TEST_P(SolidNetOf, AFreeOneKeepsItsMomentumAndGainsNoEnergy) {
   std::array<double, 2> turned{};
   for (const int half : {0, 1}) {
     const int steps = half == 0 ? 10 : 20;
-    SolidMotion moving = body.moving(sure());
+    integrator::SolidMotion moving = body.moving(sure());
     std::mt19937 random(3);
     std::uniform_real_distribution<double> value(-20, 20);
     Numbers velocity;
@@ -161,10 +162,10 @@ TEST_P(SolidNetOf, AFreeOneKeepsItsMomentumAndGainsNoEnergy) {
 TEST_P(SolidNetOf, AChainAtRestCarriesItsWeight) {
   Chained body(GetParam().quadratic);
   body.springs.pop_back();
-  SolidMotionOptions options = sure();
+  integrator::SolidMotionOptions options = sure();
   options.damping = 1e-2;
   std::ranges::fill(body.drag, 40.0);
-  SolidMotion moving = body.moving(options);
+  integrator::SolidMotion moving = body.moving(options);
   std::vector<std::uint8_t> held;
   Numbers load;
   for (std::size_t i = 0; i < body.mesh.points.size(); ++i) {
@@ -178,18 +179,19 @@ TEST_P(SolidNetOf, AChainAtRestCarriesItsWeight) {
   double below = 0;
   for (std::size_t k = 3; k-- > 0;) {
     below += 9810 * body.masses[body.first + k];
-    const SolidSpring& s = body.springs[k];
+    const integrator::SolidSpring& s = body.springs[k];
     const double length = norm(vector_at(moving.places(), s.j) - vector_at(moving.places(), s.i));
     EXPECT_NEAR(s.stiffness * (length - s.rest), below, 1e-6 * below);
   }
 }
 
 INSTANTIATE_TEST_SUITE_P(Kinds, SolidNetOf,
-                         testing::Values(Kind{SolidLaw::corotational, false},
-                                         Kind{SolidLaw::corotational, true},
-                                         Kind{SolidLaw::hyperelastic, false}),
+                         testing::Values(Kind{integrator::SolidLaw::corotational, false},
+                                         Kind{integrator::SolidLaw::corotational, true},
+                                         Kind{integrator::SolidLaw::hyperelastic, false}),
                          [](const auto& kind) {
-                           return std::string(kind.param.law == SolidLaw::corotational
+                           return std::string(kind.param.law ==
+                                                      gewebe::integrator::SolidLaw::corotational
                                                   ? "corotational"
                                                   : "neo_hookean") +
                                   (kind.param.quadratic ? "_quadratic" : "_linear");
@@ -200,11 +202,11 @@ INSTANTIATE_TEST_SUITE_P(Kinds, SolidNetOf,
 constexpr double cell = 4;
 
 /// A bar along x from `begin` to `end` cells, 2 cells wide, held at x = 0; soft from cell 3 on.
-Model bar(std::uint32_t begin, std::uint32_t end, bool quadratic = true) {
-  SolidModelOptions options;
-  const Material gel{"gel", 1e-3, 2e4, 1, 0.2, 0.4}, soft{"soft", 2e-3, 7e3, 1, 0.2, 0.3};
+model::Model bar(std::uint32_t begin, std::uint32_t end, bool quadratic = true) {
+  fem::SolidModelOptions options;
+  const model::Material gel{"gel", 1e-3, 2e4, 1, 0.2, 0.4}, soft{"soft", 2e-3, 7e3, 1, 0.2, 0.3};
   options.quadratic = quadratic;
-  TetMesh mesh = test::box_tetrahedra(end - begin, 2, 2, cell);
+  tetrahedra::TetMesh mesh = test::box_tetrahedra(end - begin, 2, 2, cell);
   for (Vec3& p : mesh.points)
     p.x += begin * cell;
   options.material.materials = {begin < 3 ? gel : soft};
@@ -217,14 +219,14 @@ Model bar(std::uint32_t begin, std::uint32_t end, bool quadratic = true) {
       mesh.material.push_back(x > 3 * cell ? 1 : 0);
     }
   }
-  Model model = solid_model(std::move(mesh), options, {});
-  for (Node& node : model.nodes)
+  model::Model model = fem::solid_model(std::move(mesh), options, {});
+  for (model::Node& node : model.nodes)
     if (node.position.x == 0)
-      node.fixed = fixed_all;
+      node.fixed = model::fixed_all;
   return model;
 }
 
-std::vector<std::uint32_t> nodes_at(const Model& model, double x) {
+std::vector<std::uint32_t> nodes_at(const model::Model& model, double x) {
   std::vector<std::uint32_t> nodes;
   for (std::uint32_t i = 0; i < model.nodes.size(); ++i)
     if (std::abs(model.nodes[i].position.x - x) < 1e-9)
@@ -232,14 +234,14 @@ std::vector<std::uint32_t> nodes_at(const Model& model, double x) {
   return nodes;
 }
 
-SolidChoice damped() {
-  SolidChoice choice;
-  choice.damping = damping_per_stiffness(0.5, 20);
+integrator::SolidChoice damped() {
+  integrator::SolidChoice choice;
+  choice.damping = integrator::damping_per_stiffness(0.5, 20);
   return choice;
 }
 
 /// Where the middle of a bar's end hangs.
-double droop(const Simulation& s, std::size_t object, const Model& model) {
+double droop(const scene::Simulation& s, std::size_t object, const model::Model& model) {
   for (std::uint32_t i = 0; i < model.nodes.size(); ++i)
     if (model.nodes[i].position == Vec3{6 * cell, cell, cell})
       return -s.displacement(object)[3 * std::size_t{i} + 2];
@@ -250,12 +252,12 @@ double droop(const Simulation& s, std::size_t object, const Model& model) {
 double droop_of_halves(double stiffness, int count) {
   Context context = one_thread();
   context.threads = count;
-  const Model left = bar(0, 3), right = bar(3, 6);
-  Simulation s(context, {});
-  s.add_object("left", left, Method::ela, {}, Integration::semi_implicit, damped());
-  s.add_object("right", right, Method::ela, {}, Integration::semi_implicit, damped());
-  s.apply(Attach{0, nodes_at(left, 3 * cell), 1, nodes_at(right, 3 * cell), stiffness});
-  s.apply(SetGravity{{0, 0, -3000}});
+  const model::Model left = bar(0, 3), right = bar(3, 6);
+  scene::Simulation s(context, {});
+  s.add_object("left", left, scene::Method::ela, {}, scene::Integration::semi_implicit, damped());
+  s.add_object("right", right, scene::Method::ela, {}, scene::Integration::semi_implicit, damped());
+  s.apply(scene::Attach{0, nodes_at(left, 3 * cell), 1, nodes_at(right, 3 * cell), stiffness});
+  s.apply(scene::SetGravity{{0, 0, -3000}});
   settle(s);
   return droop(s, 1, right);
 }
@@ -264,8 +266,8 @@ double droop_of_halves(double stiffness, int count) {
 /// tied to nothing and held along one axis.
 struct Cloth {
   static constexpr std::uint32_t side = 7;
-  TetMesh mesh;
-  std::vector<SolidSpring> springs;
+  tetrahedra::TetMesh mesh;
+  std::vector<integrator::SolidSpring> springs;
   Numbers masses, drag;
   std::vector<std::uint8_t> held;
 
@@ -291,11 +293,12 @@ struct Cloth {
     if (beside)
       held.back() = 1;
   }
-  SolidMotion moving(double tolerance) const {
-    SolidMotionOptions options;
+  integrator::SolidMotion moving(double tolerance) const {
+    integrator::SolidMotionOptions options;
     options.tolerance = tolerance;
     options.max_rounds = 200;
-    SolidMotion body(mesh, std::vector<SolidMaterial>{}, {springs, masses, drag}, options);
+    integrator::SolidMotion body(mesh, std::vector<fem::SolidMaterial>{}, {springs, masses, drag},
+                                 options);
     body.hold(held);
     Numbers load;
     for (std::size_t i = 0; i < mesh.points.size(); ++i)
@@ -312,7 +315,7 @@ TEST(SolidNet, OneMatrixServesTheThreeAxesOfANet) {
   std::array<Numbers, 2> end;
   for (const bool beside : {false, true}) {
     const std::size_t way = beside ? 1 : 0;
-    SolidMotion body = Cloth(beside).moving(1e-6);
+    integrator::SolidMotion body = Cloth(beside).moving(1e-6);
     for (int n = 0; n < 20; ++n)
       rounds[way] += body.step(0.02, {}).rounds;
     end[way] = body.displacement();
@@ -323,11 +326,11 @@ TEST(SolidNet, OneMatrixServesTheThreeAxesOfANet) {
 }
 
 TEST(SolidNet, NoRoundsAreSpentOnWhatAllButStands) {
-  SolidMotion body = Cloth(false).moving(0.02);
+  integrator::SolidMotion body = Cloth(false).moving(0.02);
   int still = 0;
   for (int n = 0; n < 400; ++n) {
     const Numbers before = body.displacement();
-    const SolidStep step = body.step(0.05, {});
+    const integrator::SolidStep step = body.step(0.05, {});
     const Numbers now = body.displacement(), none(now.size());
     if (!(largest_difference(before, now) < 1e-7 * largest_difference(now, none)))
       continue;
@@ -339,10 +342,11 @@ TEST(SolidNet, NoRoundsAreSpentOnWhatAllButStands) {
 
 /// A bar in two that stiff ties hold together is nearly the whole one.
 TEST(SolidNet, TwoHalvesThatAreTiedBendAsOne) {
-  const Model model = bar(0, 6);
-  Simulation whole(one_thread(), {});
-  whole.add_object("whole", model, Method::ela, {}, Integration::semi_implicit, damped());
-  whole.apply(SetGravity{{0, 0, -3000}});
+  const model::Model model = bar(0, 6);
+  scene::Simulation whole(one_thread(), {});
+  whole.add_object("whole", model, scene::Method::ela, {}, scene::Integration::semi_implicit,
+                   damped());
+  whole.apply(scene::SetGravity{{0, 0, -3000}});
   settle(whole);
   const double expected = droop(whole, 0, model);
   EXPECT_GT(expected, 0.5);
@@ -353,19 +357,19 @@ TEST(SolidNet, TwoHalvesThatAreTiedBendAsOne) {
 
 /// The energy of bodies that move as one is told once.
 TEST(SolidNet, TiedBodiesThatFallHaveTheirEnergyOnce) {
-  Model left = bar(0, 3), right = bar(3, 6);
+  model::Model left = bar(0, 3), right = bar(3, 6);
   double mass = 0;
-  for (Model* const model : {&left, &right})
-    for (Node& node : model->nodes) {
+  for (model::Model* const model : {&left, &right})
+    for (model::Node& node : model->nodes) {
       node.fixed = 0;
       node.drag = 0;
       mass += node.mass;
     }
-  Simulation s(one_thread(), {});
-  s.add_object("left", left, Method::ela);
-  s.add_object("right", right, Method::ela);
-  s.apply(Attach{0, nodes_at(left, 3 * cell), 1, nodes_at(right, 3 * cell), 1e5});
-  s.apply(SetGravity{{0, 0, -1000}});
+  scene::Simulation s(one_thread(), {});
+  s.add_object("left", left, scene::Method::ela);
+  s.add_object("right", right, scene::Method::ela);
+  s.apply(scene::Attach{0, nodes_at(left, 3 * cell), 1, nodes_at(right, 3 * cell), 1e5});
+  s.apply(scene::SetGravity{{0, 0, -1000}});
   s.step(0.1);
   const double expected = mass * 100 * 100 / 2;
   EXPECT_NEAR(s.state().kinetic_energy, expected, 1e-6 * expected);
@@ -374,46 +378,48 @@ TEST(SolidNet, TiedBodiesThatFallHaveTheirEnergyOnce) {
 
 /// A net that hangs on a solid by ties: they carry its weight.
 TEST(SolidNet, ANetHangsOnASolid) {
-  const Model beam = bar(0, 6);
-  Model net = test::organ(2);
+  const model::Model beam = bar(0, 6);
+  model::Model net = test::organ(2);
   double weight = 0;
   Vec3 top{0, 0, -HUGE_VAL};
-  for (Node& node : net.nodes) {
+  for (model::Node& node : net.nodes) {
     node.fixed = 0;
     weight += node.mass * 100;
     if (node.position.z > top.z)
       top = node.position;
   }
-  for (Node& node : net.nodes)
+  for (model::Node& node : net.nodes)
     node.position += Vec3{6 * cell, cell, -1} - top;
   std::vector<std::uint32_t> upper;
-  for (std::uint32_t i = 0; i < surface_count(net); ++i)
+  for (std::uint32_t i = 0; i < model::surface_count(net); ++i)
     if (net.nodes[i].position.z > -8)
       upper.push_back(i);
-  Simulation s(one_thread(), {});
-  s.add_object("beam", beam, Method::ela, {}, Integration::semi_implicit, damped());
-  s.add_object("net", net, Method::ela, {}, Integration::implicit);
-  s.apply(SetGravity{{0, 0, -100}});
-  s.apply(Attach{1, upper, 0, nodes_at(beam, 6 * cell), 2000});
+  scene::Simulation s(one_thread(), {});
+  s.add_object("beam", beam, scene::Method::ela, {}, scene::Integration::semi_implicit, damped());
+  s.add_object("net", net, scene::Method::ela, {}, scene::Integration::implicit);
+  s.apply(scene::SetGravity{{0, 0, -100}});
+  s.apply(scene::Attach{1, upper, 0, nodes_at(beam, 6 * cell), 2000});
   settle(s);
   const double loaded = droop(s, 0, beam);
-  Simulation alone(one_thread(), {});
-  alone.add_object("beam", beam, Method::ela, {}, Integration::semi_implicit, damped());
-  alone.apply(SetGravity{{0, 0, -100}});
+  scene::Simulation alone(one_thread(), {});
+  alone.add_object("beam", beam, scene::Method::ela, {}, scene::Integration::semi_implicit,
+                   damped());
+  alone.apply(scene::SetGravity{{0, 0, -100}});
   // The same weight, put on its end by hand.
   const auto end = nodes_at(beam, 6 * cell);
-  alone.apply(SetForce{0, end, {0, 0, -weight / static_cast<double>(end.size())}});
+  alone.apply(scene::SetForce{0, end, {0, 0, -weight / static_cast<double>(end.size())}});
   settle(alone);
   EXPECT_GT(loaded, 0.05);
   EXPECT_NEAR(loaded, droop(alone, 0, beam), 0.1 * loaded);
 }
 
-std::string refusal(const Model& other, Integration integration, const SolidChoice& choice) {
-  Simulation s(one_thread(), {});
-  s.add_object("a", bar(0, 3), Method::ela, {}, Integration::semi_implicit, damped());
-  s.add_object("b", other, Method::ela, {}, integration, choice);
+std::string refusal(const model::Model& other, scene::Integration integration,
+                    const integrator::SolidChoice& choice) {
+  scene::Simulation s(one_thread(), {});
+  s.add_object("a", bar(0, 3), scene::Method::ela, {}, scene::Integration::semi_implicit, damped());
+  s.add_object("b", other, scene::Method::ela, {}, integration, choice);
   try {
-    s.apply(Attach{0, {nodes_at(s.model(0), 3 * cell)[0]}, 1, {0}, 10});
+    s.apply(scene::Attach{0, {nodes_at(s.model(0), 3 * cell)[0]}, 1, {0}, 10});
   } catch (const Error& error) {
     return error.what();
   }
@@ -421,15 +427,15 @@ std::string refusal(const Model& other, Integration integration, const SolidChoi
 }
 
 TEST(SolidNet, RefusesWhatCantMoveAsOne) {
-  EXPECT_EQ(refusal(bar(3, 6), Integration::semi_implicit, damped()), "");
-  EXPECT_EQ(refusal(test::organ(2), Integration::implicit, {}), "");
-  EXPECT_EQ(refusal(test::organ(2), Integration::semi_implicit, {}),
+  EXPECT_EQ(refusal(bar(3, 6), scene::Integration::semi_implicit, damped()), "");
+  EXPECT_EQ(refusal(test::organ(2), scene::Integration::implicit, {}), "");
+  EXPECT_EQ(refusal(test::organ(2), scene::Integration::semi_implicit, {}),
             "one of a and b is implicit and the other is not, expected both alike");
-  EXPECT_EQ(refusal(bar(3, 6, false), Integration::semi_implicit, damped()),
+  EXPECT_EQ(refusal(bar(3, 6, false), scene::Integration::semi_implicit, damped()),
             "one of a and b is linear and the other quadratic, expected both alike");
-  EXPECT_EQ(refusal(bar(3, 6), Integration::semi_implicit, {}),
+  EXPECT_EQ(refusal(bar(3, 6), scene::Integration::semi_implicit, {}),
             "law=, damping= and tolerance= of a and b differ, expected both alike");
 }
 
 } // namespace
-} // namespace gewebe
+} // namespace gewebe::test

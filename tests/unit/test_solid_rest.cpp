@@ -20,7 +20,7 @@
 #include <string>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::test {
 namespace {
 
 using Numbers = std::vector<double>;
@@ -34,15 +34,15 @@ double largest(const Numbers& a) {
 
 /// A solid, what is held of it and where to, and its load.
 struct Rest {
-  TetMesh mesh;
-  std::vector<SolidMaterial> materials;
+  tetrahedra::TetMesh mesh;
+  std::vector<fem::SolidMaterial> materials;
   std::vector<std::uint8_t> held;
   Numbers target, load;
 
-  Rest(TetMesh of, bool quadratic, double poisson, double e = young)
+  Rest(tetrahedra::TetMesh of, bool quadratic, double poisson, double e = young)
       : mesh(std::move(of)), materials{{e, poisson, 1e-3}} {
     if (quadratic)
-      make_quadratic(mesh);
+      tetrahedra::make_quadratic(mesh);
     held.resize(3 * mesh.points.size());
     target.resize(held.size());
     load.resize(held.size());
@@ -56,19 +56,19 @@ struct Rest {
         target[3 * i + axis] = to(mesh.points[i]);
       }
   }
-  SolidMotion body(SolidLaw law, double tolerance = 1e-8) const {
-    SolidMotionOptions options;
+  integrator::SolidMotion body(integrator::SolidLaw law, double tolerance = 1e-8) const {
+    integrator::SolidMotionOptions options;
     options.law = law;
     options.tolerance = tolerance;
     options.max_rounds = 200;
-    SolidMotion body(mesh, materials, options);
+    integrator::SolidMotion body(mesh, materials, options);
     body.hold(held);
     body.set_load(load);
     body.move_held(target);
     return body;
   }
   /// Sum of what holders of the nodes there push with along an axis.
-  double pull(const SolidMotion& body, std::size_t axis,
+  double pull(const integrator::SolidMotion& body, std::size_t axis,
               const std::function<bool(const Vec3&)>& there) const {
     double sum = 0;
     for (std::size_t i = 0; i < mesh.points.size(); ++i)
@@ -76,8 +76,8 @@ struct Rest {
     return sum;
   }
   Numbers by_newton(int* rounds = nullptr) const {
-    const auto state =
-        hyperelastic_statics(mesh, solid_elements(mesh, materials), held, target, {load, {}});
+    const auto state = fit::hyperelastic_statics(mesh, fem::solid_elements(mesh, materials), held,
+                                                 target, {load, {}});
     if (rounds != nullptr)
       *rounds = state.rounds;
     return state.displacement.axes;
@@ -85,7 +85,7 @@ struct Rest {
 };
 
 /// First Piola-Kirchhoff stress of stable Neo-Hookean material under stretches along the axes.
-double stress(const Elasticity& m, const std::array<double, 3>& stretch, std::size_t axis) {
+double stress(const fem::Elasticity& m, const std::array<double, 3>& stretch, std::size_t axis) {
   const double j = stretch[0] * stretch[1] * stretch[2],
                i_c = stretch[0] * stretch[0] + stretch[1] * stretch[1] + stretch[2] * stretch[2];
   const double mu = 4.0 / 3 * m.mu, lambda = m.lambda + 5.0 / 6 * m.mu,
@@ -103,10 +103,10 @@ TEST(SolidRest, UniaxialStretchIsAnalytic) {
         bar.hold(
             0, [](const Vec3& p) { return p.x == 3; },
             [&](const Vec3&) { return 3 * (stretch - 1); });
-        SolidMotion body = bar.body(SolidLaw::hyperelastic);
-        const SolidStep step = body.settle({});
+        integrator::SolidMotion body = bar.body(integrator::SolidLaw::hyperelastic);
+        const integrator::SolidStep step = body.settle({});
         EXPECT_LE(step.left, 1e-8);
-        const Elasticity m = elasticity(young, poisson);
+        const fem::Elasticity m = fem::elasticity(young, poisson);
         double low = 0.3, high = 2;
         for (int round = 0; round < 100; ++round) {
           const double s = (low + high) / 2;
@@ -134,7 +134,7 @@ TEST(SolidRest, SimpleShearIsAnalytic) {
       box.hold(0, outside, [&](const Vec3& p) { return shear * p.z; });
       box.hold(1, outside);
       box.hold(2, outside);
-      SolidMotion body = box.body(SolidLaw::hyperelastic);
+      integrator::SolidMotion body = box.body(integrator::SolidLaw::hyperelastic);
       EXPECT_LE(body.settle({}).left, 1e-8);
       double off = 0, work = 0;
       for (std::size_t i = 0; i < box.mesh.points.size(); ++i) {
@@ -145,7 +145,7 @@ TEST(SolidRest, SimpleShearIsAnalytic) {
       }
       EXPECT_LE(off, 1e-6);
       EXPECT_NEAR(work / 27,
-                  4.0 / 3 * elasticity(young, 0.45).mu * (1 - 1 / (4 + shear * shear)) * shear,
+                  4.0 / 3 * fem::elasticity(young, 0.45).mu * (1 - 1 / (4 + shear * shear)) * shear,
                   1e-5 * young);
     }
 }
@@ -159,7 +159,7 @@ TEST(SolidRest, ACantileverIsWhereNewtonsMethodHasIt) {
       for (std::size_t i = 0; i < beam.mesh.points.size(); ++i)
         if (beam.mesh.points[i].x == 40)
           beam.load[3 * i + 2] = quadratic ? -200 : -600;
-      SolidMotion body = beam.body(SolidLaw::hyperelastic);
+      integrator::SolidMotion body = beam.body(integrator::SolidLaw::hyperelastic);
       EXPECT_LE(body.settle({}).left, 1e-8);
       const Numbers expected = beam.by_newton();
       EXPECT_GT(largest(expected), 8);
@@ -175,12 +175,12 @@ TEST(SolidRest, AHangingBarIsAnalytic) {
     bar.hold(axis, [&](const Vec3& p) {
       return axis == 2 ? p.z == length : p[static_cast<int>(axis)] == 0;
     });
-  const SolidMotion masses = bar.body(SolidLaw::hyperelastic);
+  const integrator::SolidMotion masses = bar.body(integrator::SolidLaw::hyperelastic);
   for (std::size_t i = 0; i < bar.mesh.points.size(); ++i)
     bar.load[3 * i + 2] = -gravity * masses.masses()[i];
-  SolidMotion body = bar.body(SolidLaw::hyperelastic);
+  integrator::SolidMotion body = bar.body(integrator::SolidLaw::hyperelastic);
   EXPECT_LE(body.settle({}).left, 1e-8);
-  const Elasticity m = elasticity(young, 0);
+  const fem::Elasticity m = fem::elasticity(young, 0);
   // Stretch and stretch across, for which nothing pulls there, under a tension per area at rest.
   const auto stretch_under = [&](double tension) {
     double low = 1, high = 3;
@@ -208,7 +208,8 @@ TEST(SolidRest, AHangingBarIsAnalytic) {
 
 /// From far away, corotational too: downhill, and what holders push with balances the load.
 TEST(SolidRest, FarLoadsBalance) {
-  for (const SolidLaw law : {SolidLaw::corotational, SolidLaw::hyperelastic})
+  for (const integrator::SolidLaw law :
+       {integrator::SolidLaw::corotational, integrator::SolidLaw::hyperelastic})
     for (const bool quadratic : {false, true}) {
       Rest beam(test::box_tetrahedra(6, 2, 2, 5), quadratic, 0.45);
       for (std::size_t axis = 0; axis < 3; ++axis)
@@ -217,8 +218,8 @@ TEST(SolidRest, FarLoadsBalance) {
       for (std::size_t i = 0; i < beam.mesh.points.size(); ++i)
         if (beam.mesh.points[i].x == 30)
           load += beam.load[3 * i + 1] = quadratic ? 200 : 400;
-      SolidMotion body = beam.body(law);
-      const SolidStep step = body.settle({});
+      integrator::SolidMotion body = beam.body(law);
+      const integrator::SolidStep step = body.settle({});
       EXPECT_LE(step.left, 1e-8);
       EXPECT_NEAR(beam.pull(body, 1, [](const Vec3& p) { return p.x == 0; }), -load, 1e-5 * load);
       // Not moved when asked again, nor by what it did before.
@@ -229,4 +230,4 @@ TEST(SolidRest, FarLoadsBalance) {
 }
 
 } // namespace
-} // namespace gewebe
+} // namespace gewebe::test

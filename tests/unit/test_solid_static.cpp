@@ -29,32 +29,32 @@
 #include <string>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::test {
 namespace {
 
 /// A bar of cells of `edge` along x, held at x = 0 by whole nodes.
-Model bar(TetMesh mesh, double young, double poisson = 0.45, int order = 1) {
-  SolidModelOptions options;
+model::Model bar(tetrahedra::TetMesh mesh, double young, double poisson = 0.45, int order = 1) {
+  fem::SolidModelOptions options;
   options.material.materials = {{"gel", 1e-3, young, 1, 0.2, poisson}};
   options.quadratic = order == 2;
-  Model model = solid_model(std::move(mesh), options, {});
-  for (Node& node : model.nodes)
+  model::Model model = fem::solid_model(std::move(mesh), options, {});
+  for (model::Node& node : model.nodes)
     if (node.position.x == 0)
-      node.fixed = fixed_all;
+      node.fixed = model::fixed_all;
   return model;
 }
-Model bar(double young = 2e4, int order = 1) {
+model::Model bar(double young = 2e4, int order = 1) {
   return bar(test::box_tetrahedra(10, 2, 2, 4), young, 0.45, order);
 }
 
-std::vector<std::uint32_t> where(const Model& model, auto&& is) {
+std::vector<std::uint32_t> where(const model::Model& model, auto&& is) {
   std::vector<std::uint32_t> nodes;
-  for (std::uint32_t i = 0; i < surface_count(model); ++i)
+  for (std::uint32_t i = 0; i < model::surface_count(model); ++i)
     if (is(model.nodes[i].position))
       nodes.push_back(i);
   return nodes;
 }
-std::vector<std::uint32_t> end_of(const Model& model) {
+std::vector<std::uint32_t> end_of(const model::Model& model) {
   return where(model, [](const Vec3& p) { return p.x > 40 - 1e-9; });
 }
 
@@ -65,8 +65,8 @@ double largest(std::span<const double> values) {
   return most;
 }
 
-SolidChoice law(SolidLaw of = SolidLaw::hyperelastic) {
-  SolidChoice choice;
+integrator::SolidChoice law(integrator::SolidLaw of = integrator::SolidLaw::hyperelastic) {
+  integrator::SolidChoice choice;
   choice.law = of;
   return choice;
 }
@@ -77,15 +77,16 @@ struct Reference {
   std::vector<double> u;
   std::vector<double> forces; ///< that hold, by axis
   /// \param start  a shape near to it, or none
-  explicit Reference(const Model& model, const Load& load, std::span<const double> start = {}) {
-    const TetMesh mesh = element_mesh(model);
-    const auto elements = solid_elements(mesh, element_materials(model));
+  explicit Reference(const model::Model& model, const contact::Load& load,
+                     std::span<const double> start = {}) {
+    const tetrahedra::TetMesh mesh = fem::element_mesh(model);
+    const auto elements = fem::solid_elements(mesh, fem::element_materials(model));
     std::vector<std::uint8_t> fixed(3 * model.nodes.size());
     std::vector<double> prescribed(fixed.size());
-    SolidVector f{weight_of(model, load.gravity), {}};
+    fit::SolidVector f{fem::weight_of(model, load.gravity), {}};
     for (std::uint32_t i = 0; i < model.nodes.size(); ++i)
       for (int a = 0; a < 3; ++a)
-        fixed[axis_of(i, a)] = is_fixed(model, i, a) ? 1 : 0;
+        fixed[axis_of(i, a)] = contact::is_fixed(model, i, a) ? 1 : 0;
     for (const auto& [node, d] : load.displacement)
       for (int a = 0; a < 3; ++a) {
         fixed[axis_of(node, a)] = 1;
@@ -94,11 +95,11 @@ struct Reference {
     for (const auto& [node, force] : load.force)
       for (int a = 0; a < 3; ++a)
         f.axes[axis_of(node, a)] += force[a];
-    HyperelasticOptions options;
+    fit::HyperelasticOptions options;
     options.start.axes.assign(start.begin(), start.end());
-    const auto found = hyperelastic_statics(mesh, elements, fixed, prescribed, f, options);
+    const auto found = fit::hyperelastic_statics(mesh, elements, fixed, prescribed, f, options);
     u = found.displacement.axes;
-    forces = hyperelastic_forces(mesh, elements, found.displacement).axes;
+    forces = fit::hyperelastic_forces(mesh, elements, found.displacement).axes;
     for (std::size_t k = 0; k < forces.size(); ++k)
       forces[k] = -forces[k] - f.axes[k];
   }
@@ -107,16 +108,16 @@ struct Reference {
 class SolidStaticOf : public testing::TestWithParam<int> {};
 
 /// \param near  whether Newton's method starts from there, which does not find its way to all
-void expect_newtons_shapes(const Model& model, bool near = false) {
+void expect_newtons_shapes(const model::Model& model, bool near = false) {
   const auto end = end_of(model);
-  Load heavy, moved;
+  contact::Load heavy, moved;
   heavy.gravity = {0, 0, -9810};
   for (const std::uint32_t node : end)
     heavy.force[node] = {0, 0, -1e4 / static_cast<double>(end.size())};
   for (const std::uint32_t node : end)
     moved.displacement[node] = {14, 0, -12};
-  for (const Load& load : {heavy, moved}) {
-    SolidStatic body(model, SolidLaw::hyperelastic, test::one_thread());
+  for (const contact::Load& load : {heavy, moved}) {
+    dynamics::SolidStatic body(model, integrator::SolidLaw::hyperelastic, test::one_thread());
     ASSERT_NO_THROW(body.update(load));
     const Reference expected(model, load, near ? body.displacement() : std::span<const double>());
     EXPECT_GT(largest(expected.u), 12);
@@ -124,7 +125,7 @@ void expect_newtons_shapes(const Model& model, bool near = false) {
     const auto forces = body.holding_forces();
     ASSERT_EQ(forces.size(), load.displacement.size());
     double most = 0, off = 0;
-    for (const NodeVector& f : forces) {
+    for (const contact::NodeVector& f : forces) {
       const Vec3 other = vector_at(std::span<const double>(expected.forces), f.node);
       most = test::larger(most, norm(other));
       off = test::larger(off, norm(f.value - other));
@@ -139,17 +140,17 @@ void expect_newtons_shapes(const Model& model, bool near = false) {
 }
 
 TEST_P(SolidStaticOf, LargeShapesAreThoseOfNewtonsMethod) {
-  Model model = bar(2e4, GetParam());
+  model::Model model = bar(2e4, GetParam());
   expect_newtons_shapes(model);
   for (const char* const law : {"yeoh:c20=0.1", "mooney-rivlin:c01=0.2", "ogden:alpha1=4"}) {
     SCOPED_TRACE(law);
-    model.materials[0].law = parse_law(law);
-    if (GetParam() == 2 && model.materials[0].law->kind != HyperelasticLaw::yeoh)
+    model.materials[0].law = model::parse_law(law);
+    if (GetParam() == 2 && model.materials[0].law->kind != model::HyperelasticLaw::yeoh)
       continue; // Newton's method takes long
     expect_newtons_shapes(model, true);
     // Almost all of a load is taken away.
-    SolidStatic body(model, SolidLaw::hyperelastic, test::one_thread());
-    Load heavy, light;
+    dynamics::SolidStatic body(model, integrator::SolidLaw::hyperelastic, test::one_thread());
+    contact::Load heavy, light;
     heavy.gravity = {0, 0, -9810};
     light.gravity = {0, 0, -1};
     body.update(heavy);
@@ -161,42 +162,43 @@ TEST_P(SolidStaticOf, LargeShapesAreThoseOfNewtonsMethod) {
 
 /// A material's law is that of its object, if none is chosen.
 TEST(SolidStatic, AnObjectHasTheLawOfItsMaterial) {
-  Model model = bar();
+  model::Model model = bar();
   std::vector<std::vector<double>> shapes;
   for (const char* const law : {"yeoh:c20=3", "neo-hookean", ""}) {
     model.materials[0].law.reset();
     if (*law != 0)
-      model.materials[0].law = parse_law(law);
-    Simulation scene(test::one_thread(), {});
-    scene.add_object("bar", model, Method::ffe);
-    scene.apply(SetGravity{{0, 0, -9810}});
+      model.materials[0].law = model::parse_law(law);
+    scene::Simulation scene(test::one_thread(), {});
+    scene.add_object("bar", model, scene::Method::ffe);
+    scene.apply(scene::SetGravity{{0, 0, -9810}});
     scene.step(0.1);
     const auto u = scene.displacement(0);
     shapes.emplace_back(u.begin(), u.end());
   }
-  Load weight;
+  contact::Load weight;
   weight.gravity = {0, 0, -9810};
-  model.materials[0].law = parse_law("yeoh:c20=3");
+  model.materials[0].law = model::parse_law("yeoh:c20=3");
   EXPECT_LE(test::relative_difference(shapes[0], Reference(model, weight).u), 1e-5);
   EXPECT_GT(test::relative_difference(shapes[0], shapes[1]), 1e-3);
   EXPECT_GT(test::relative_difference(shapes[1], shapes[2]), 0.1); // that is the linear one
-  model.materials[0].law = parse_law("classical-neo-hookean");
-  Simulation scene(test::one_thread(), {});
-  EXPECT_THROW(scene.add_object("bar", model, Method::ffe), Error);
+  model.materials[0].law = model::parse_law("classical-neo-hookean");
+  scene::Simulation scene(test::one_thread(), {});
+  EXPECT_THROW(scene.add_object("bar", model, scene::Method::ffe), Error);
 }
 
 TEST_P(SolidStaticOf, UnderSmallLoadsItIsTheLinearMethod) {
-  const Model model = bar(2e4, GetParam());
-  Load load;
+  const model::Model model = bar(2e4, GetParam());
+  contact::Load load;
   load.gravity = {0, 0.1, -0.2};
   for (const std::uint32_t node : end_of(model))
     load.force[node] = {0, 0.03, -0.05};
   for (const std::uint32_t node : where(model, [](const Vec3& p) { return p.x == 20 && p.z == 8; }))
     load.displacement[node] = {1e-6, 0, 2e-6};
-  Elastostatic linear(model, nullptr, test::one_thread());
+  statics::Elastostatic linear(model, nullptr, test::one_thread());
   linear.update(load);
-  for (const SolidLaw of : {SolidLaw::corotational, SolidLaw::hyperelastic}) {
-    SolidStatic body(model, of, test::one_thread());
+  for (const integrator::SolidLaw of :
+       {integrator::SolidLaw::corotational, integrator::SolidLaw::hyperelastic}) {
+    dynamics::SolidStatic body(model, of, test::one_thread());
     body.update(load);
     EXPECT_LE(test::relative_difference(body.displacement(), linear.displacement()), 1e-4);
     const auto forces = body.holding_forces();
@@ -209,21 +211,22 @@ TEST_P(SolidStaticOf, UnderSmallLoadsItIsTheLinearMethod) {
 
 /// The shape of a body in motion that was damped until it rested.
 TEST_P(SolidStaticOf, AMovingBodyComesToRestThere) {
-  const Model model = bar(2e4, GetParam());
-  for (const SolidLaw of : {SolidLaw::corotational, SolidLaw::hyperelastic}) {
+  const model::Model model = bar(2e4, GetParam());
+  for (const integrator::SolidLaw of :
+       {integrator::SolidLaw::corotational, integrator::SolidLaw::hyperelastic}) {
     std::vector<std::vector<double>> shapes;
-    for (const Method method : {Method::ffe, Method::ela}) {
-      Simulation scene(test::one_thread(), {});
-      SolidChoice choice = law(of);
+    for (const scene::Method method : {scene::Method::ffe, scene::Method::ela}) {
+      scene::Simulation scene(test::one_thread(), {});
+      integrator::SolidChoice choice = law(of);
       choice.tolerance = 1e-5;
-      choice.damping = damping_per_stiffness(0.5, 3);
-      scene.add_object("bar", model, method, {}, Integration::semi_implicit, choice);
-      scene.apply(SetGravity{{0, 0, -4000}});
+      choice.damping = integrator::damping_per_stiffness(0.5, 3);
+      scene.add_object("bar", model, method, {}, scene::Integration::semi_implicit, choice);
+      scene.apply(scene::SetGravity{{0, 0, -4000}});
       const std::vector<std::uint32_t> top =
           where(model, [](const Vec3& p) { return p.z == 8 && p.x > 10; });
-      scene.apply(SetPressure{0, top, {-60, 0}});
-      scene.apply(SetTimestep{0.5});
-      scene.step(method == Method::ffe ? 0.5 : 60);
+      scene.apply(scene::SetPressure{0, top, {-60, 0}});
+      scene.apply(scene::SetTimestep{0.5});
+      scene.step(method == scene::Method::ffe ? 0.5 : 60);
       const auto u = scene.displacement(0);
       shapes.emplace_back(u.begin(), u.end());
     }
@@ -235,13 +238,13 @@ TEST_P(SolidStaticOf, AMovingBodyComesToRestThere) {
 INSTANTIATE_TEST_SUITE_P(Orders, SolidStaticOf, testing::Values(1, 2));
 
 TEST(SolidStatic, WhatNothingHoldsIsRefused) {
-  Model model = bar();
-  for (Node& node : model.nodes)
+  model::Model model = bar();
+  for (model::Node& node : model.nodes)
     node.fixed = 0;
-  SolidStatic body(model, SolidLaw::corotational, test::one_thread());
-  Load load;
+  dynamics::SolidStatic body(model, integrator::SolidLaw::corotational, test::one_thread());
+  contact::Load load;
   load.gravity = {0, 0, -1};
-  EXPECT_THROW(body.update(load), SingularStiffness);
+  EXPECT_THROW(body.update(load), linalg::SingularStiffness);
   for (const std::uint32_t node : end_of(model)) // that hold it
     load.displacement[node] = {0, 0, 1};
   body.update(load);
@@ -249,9 +252,9 @@ TEST(SolidStatic, WhatNothingHoldsIsRefused) {
 }
 
 TEST(SolidStatic, WhatIsNotFoundTellsTheShareThatWas) {
-  const Model model = bar();
-  SolidStatic body(model, SolidLaw::hyperelastic, test::one_thread());
-  Load load;
+  const model::Model model = bar();
+  dynamics::SolidStatic body(model, integrator::SolidLaw::hyperelastic, test::one_thread());
+  contact::Load load;
   for (const std::uint32_t node : end_of(model))
     load.force[node] = {0, 0, 1e30};
   try {
@@ -265,15 +268,15 @@ TEST(SolidStatic, WhatIsNotFoundTellsTheShareThatWas) {
 }
 
 TEST(SolidStatic, AnAnswerIsAValue) {
-  const Model model = bar();
-  const auto shown = [](SolidStatic& body, const Vec3& gravity) {
-    Load load;
+  const model::Model model = bar();
+  const auto shown = [](dynamics::SolidStatic& body, const Vec3& gravity) {
+    contact::Load load;
     load.gravity = gravity;
     body.update(load);
     const auto u = body.displacement();
     return std::vector<double>(u.begin(), u.end());
   };
-  SolidStatic one(model, SolidLaw::hyperelastic, test::one_thread());
+  dynamics::SolidStatic one(model, integrator::SolidLaw::hyperelastic, test::one_thread());
   const std::vector<double> first = shown(one, {0, 0, -9810});
   const auto kept = one.answer();
   const std::vector<double> second = shown(one, {0, 9810, -9810});
@@ -283,14 +286,14 @@ TEST(SolidStatic, AnAnswerIsAValue) {
   EXPECT_EQ(shown(one, {0, 9810, -9810}), second);
   Context threads;
   threads.threads = 2;
-  SolidStatic other(model, SolidLaw::hyperelastic, threads);
+  dynamics::SolidStatic other(model, integrator::SolidLaw::hyperelastic, threads);
   other.restore(kept);
   EXPECT_EQ(shown(other, {0, 9810, -9810}), second);
 }
 
 class Pressed : public test::PressedBar {
 public:
-  explicit Pressed(SolidLaw of = SolidLaw::hyperelastic, int threads = 1)
+  explicit Pressed(integrator::SolidLaw of = integrator::SolidLaw::hyperelastic, int threads = 1)
       : test::PressedBar(bar(), law(of), false, threads) {}
   std::vector<double> shape() const {
     const auto u = scene().displacement(0);
@@ -303,15 +306,15 @@ TEST(SolidStatic, AnInstrumentPressesTheBarDown) {
   for (const double z : {13.0, 9.0, 4.0, 0.0, 9.0}) {
     pressed.press(z);
     const std::vector<double> u = pressed.shape();
-    const Simulation& scene = pressed.scene();
+    const scene::Simulation& scene = pressed.scene();
     EXPECT_GT(scene.instrument(0).nodes, 0U);
     EXPECT_NEAR(test::surface_depth(pressed.model(), u, {6, {}, 0}, {{36, 4, z}, {}}), 0,
                 test::depth_allowed);
     // No friction: all forces pass through the centre.
     EXPECT_LE(norm(scene.instrument(0).torque), 1e-6 * 6 * norm(scene.instrument(0).force));
     Vec3 sum;
-    Load load;
-    for (const NodeVector& f : scene.contact_forces(0)) {
+    contact::Load load;
+    for (const contact::NodeVector& f : scene.contact_forces(0)) {
       sum += f.value;
       load.force[f.node] = f.value;
     }
@@ -323,13 +326,14 @@ TEST(SolidStatic, AnInstrumentPressesTheBarDown) {
 
 /// A block under a sphere that goes 12 mm into its 20 mm.
 TEST(SolidStatic, ABlockIsIndentedDeeply) {
-  for (const SolidLaw of : {SolidLaw::hyperelastic}) {
-    Model model = bar(test::box_tetrahedra(6, 6, 4, 5), 2500, 0.45, 2);
-    for (Node& node : model.nodes)
-      node.fixed = node.position.z == 0 ? fixed_all : 0;
-    Simulation scene(test::one_thread(), {});
-    scene.add_object("block", model, Method::ffe, {}, Integration::semi_implicit, law(of));
-    SetInstrument ball;
+  for (const integrator::SolidLaw of : {integrator::SolidLaw::hyperelastic}) {
+    model::Model model = bar(test::box_tetrahedra(6, 6, 4, 5), 2500, 0.45, 2);
+    for (model::Node& node : model.nodes)
+      node.fixed = node.position.z == 0 ? model::fixed_all : 0;
+    scene::Simulation scene(test::one_thread(), {});
+    scene.add_object("block", model, scene::Method::ffe, {}, scene::Integration::semi_implicit,
+                     law(of));
+    scene::SetInstrument ball;
     ball.name = "ball";
     ball.shape.radius = 8;
     ball.pose.place = {15, 15, 30};
@@ -338,7 +342,7 @@ TEST(SolidStatic, ABlockIsIndentedDeeply) {
     double before = 0;
     for (int level = 1; level <= 6; ++level) {
       const Vec3 place{15, 15, 28 - 2.0 * level};
-      scene.apply(MoveInstrument{0, place, {}, 0});
+      scene.apply(scene::MoveInstrument{0, place, {}, 0});
       scene.step(0.1);
       const double force = scene.instrument(0).force.z;
       EXPECT_GT(force, before);
@@ -347,12 +351,12 @@ TEST(SolidStatic, ABlockIsIndentedDeeply) {
                   test::depth_allowed);
     }
     // Forces that hold all nodes where they are have nothing to do but at the bottom.
-    SolidMotionOptions options;
+    integrator::SolidMotionOptions options;
     options.law = of;
-    SolidMotion body(element_mesh(model), element_materials(model), options);
+    integrator::SolidMotion body(fem::element_mesh(model), fem::element_materials(model), options);
     std::vector<double> load(3 * model.nodes.size());
     double most = 0, off = 0;
-    for (const NodeVector& f : scene.contact_forces(0))
+    for (const contact::NodeVector& f : scene.contact_forces(0))
       for (int a = 0; a < 3; ++a) {
         load[axis_of(f.node, a)] = f.value[a];
         most = test::larger(most, std::abs(f.value[a]));
@@ -369,13 +373,13 @@ TEST(SolidStatic, ABlockIsIndentedDeeply) {
 }
 
 TEST(SolidStatic, ThreadsDoNotMatterAndWhatIsTakenBackLeavesNoTrace) {
-  Pressed one, two(SolidLaw::hyperelastic, 2), with_error;
+  Pressed one, two(integrator::SolidLaw::hyperelastic, 2), with_error;
   const auto fail = [&] { // a step that goes far
-    with_error.scene().apply(SetGravity{{0, 0, -5000}});
-    with_error.scene().apply(SetForce{0, end_of(one.model()), {0, 0, 1e30}});
+    with_error.scene().apply(scene::SetGravity{{0, 0, -5000}});
+    with_error.scene().apply(scene::SetForce{0, end_of(one.model()), {0, 0, 1e30}});
     EXPECT_THROW(with_error.scene().step(0.01), Error);
-    with_error.scene().apply(SetGravity{{0, 0, 0}});
-    with_error.scene().apply(SetForce{0, end_of(one.model()), {}});
+    with_error.scene().apply(scene::SetGravity{{0, 0, 0}});
+    with_error.scene().apply(scene::SetForce{0, end_of(one.model()), {}});
   };
   for (const double z : {12.0, 8.0, 3.0, 20.0, 8.0}) {
     one.press(z);
@@ -389,25 +393,25 @@ TEST(SolidStatic, ThreadsDoNotMatterAndWhatIsTakenBackLeavesNoTrace) {
 }
 
 TEST(SolidStatic, ACutBodyIsThatOfItsModel) {
-  const Model model = bar();
-  Simulation scene(test::one_thread(), {});
-  scene.add_object("bar", model, Method::ffe, {}, Integration::semi_implicit, law());
-  scene.apply(SetGravity{{0, 0, -9810}});
+  const model::Model model = bar();
+  scene::Simulation scene(test::one_thread(), {});
+  scene.add_object("bar", model, scene::Method::ffe, {}, scene::Integration::semi_implicit, law());
+  scene.apply(scene::SetGravity{{0, 0, -9810}});
   scene.step(0.01);
-  CutObject cut;
+  scene::CutObject cut;
   cut.object = 0;
-  PlaneToCut plane;
+  scene::PlaneToCut plane;
   plane.plane = {{20, 4, 8}, {1, 0, 0}};
   plane.nodes = where(model, [](const Vec3& p) { return std::abs(p.x - 20) < 5 && p.z > 3; });
   cut.what = plane;
   scene.apply(cut);
   scene.step(0.01);
-  const Model after = scene.model(0);
+  const model::Model after = scene.model(0);
   EXPECT_GT(after.nodes.size(), model.nodes.size());
-  Load load;
+  contact::Load load;
   load.gravity = {0, 0, -9810};
   EXPECT_LE(test::relative_difference(scene.displacement(0), Reference(after, load).u), 1e-5);
 }
 
 } // namespace
-} // namespace gewebe
+} // namespace gewebe::test

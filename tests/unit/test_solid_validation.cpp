@@ -11,7 +11,7 @@
 #include <cstdint>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::test {
 namespace {
 
 double wave_error(std::uint32_t n, bool quadratic, double poisson) {
@@ -95,4 +95,4 @@ TEST(SolidValidation, ASiliconeBeamDroopsAsMeasured) {
 }
 
 } // namespace
-} // namespace gewebe
+} // namespace gewebe::test

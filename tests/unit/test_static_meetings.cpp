@@ -27,7 +27,7 @@
 #include <string>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::test {
 namespace {
 
 using namespace test;
@@ -40,16 +40,17 @@ constexpr double balance_met = 1e-5 + 0.1 * contact_parameters.force_tolerance;
 constexpr double friction_met =
     contact_parameters.friction_tolerance + 2 * contact_parameters.force_tolerance;
 
-Vec3 torque_of_forces(const Simulation& s, std::size_t object) {
+Vec3 torque_of_forces(const scene::Simulation& s, std::size_t object) {
   Vec3 sum;
-  for (const NodeVector& f : s.contact_forces(object))
+  for (const contact::NodeVector& f : s.contact_forces(object))
     sum += cross(s.model(object).nodes[f.node].position + vector_at(s.displacement(object), f.node),
                  f.value);
   return sum;
 }
 
 /// All that has to hold of two objects that touch, the forces on the second leading up.
-void expect_contact(const Simulation& s, const Load& lower, const Load& upper, double friction) {
+void expect_contact(const scene::Simulation& s, const contact::Load& lower,
+                    const contact::Load& upper, double friction) {
   const Vec3 down = sum_of_forces(s, 0), up = sum_of_forces(s, 1);
   EXPECT_GT(up.z, 0);
   EXPECT_LE(norm(up + down), 1e-12 * norm(up));
@@ -59,32 +60,32 @@ void expect_contact(const Simulation& s, const Load& lower, const Load& upper, d
   EXPECT_LE(miss_of_balance(s, 0, lower), met);
   EXPECT_LE(miss_of_balance(s, 1, upper), met);
   // Of flat faces that hardly turn.
-  for (const NodeVector& f : s.contact_forces(1))
+  for (const contact::NodeVector& f : s.contact_forces(1))
     EXPECT_GE(f.value.z, -1e-9 * norm(up));
   EXPECT_LE(std::hypot(up.x, up.y), (friction + 0.1) * up.z);
 }
 
 TEST(StaticMeetings, BlocksPressEachOther) {
   for (const double friction : {0.0, 0.4}) {
-    Simulation s(one_thread(), {});
-    const Model below = block(5, 5, 2, {}, true), above = hanging(3, 3, 2, {3.7, 4.1, 8.3});
+    scene::Simulation s(one_thread(), {});
+    const model::Model below = block(5, 5, 2, {}, true), above = hanging(3, 3, 2, {3.7, 4.1, 8.3});
     add_static(s, "below", below);
     add_static(s, "above", above);
-    s.apply(SetContact{0, 1, friction});
+    s.apply(scene::SetContact{0, 1, friction});
     s.step(0.1);
     EXPECT_TRUE(s.contact_forces(0).empty());
-    Load push;
+    contact::Load push;
     const std::vector<std::uint32_t> lowest = nodes_below(above, 9);
     for (int k = 1; k <= 5; ++k) {
       for (const std::uint32_t node : lowest)
         push.force[node] = {5000.0 * k, 0, -20000.0 * k};
-      s.apply(SetForce{1, lowest, {5000.0 * k, 0, -20000.0 * k}});
+      s.apply(scene::SetForce{1, lowest, {5000.0 * k, 0, -20000.0 * k}});
       s.step(0.1);
       if (k > 1)
         expect_contact(s, {}, push, friction);
     }
     // What lets go is as it was.
-    s.apply(Release{1, lowest});
+    s.apply(scene::Release{1, lowest});
     s.step(0.1);
     for (std::size_t object : {0U, 1U})
       for (const double u : s.displacement(object))
@@ -97,16 +98,16 @@ TEST(StaticMeetings, BlocksPressEachOther) {
 TEST(StaticMeetings, FrictionHoldsWhatWouldSlide) {
   std::vector<double> way;
   for (const double friction : {0.0, 0.2, 2.0}) {
-    Simulation s(one_thread(), {});
-    const Model above = hanging(3, 3, 2, {3.7, 4.1, 8.1});
+    scene::Simulation s(one_thread(), {});
+    const model::Model above = hanging(3, 3, 2, {3.7, 4.1, 8.1});
     add_static(s, "below", block(5, 5, 2, {}, true));
     add_static(s, "above", above);
-    s.apply(SetContact{0, 1, friction});
+    s.apply(scene::SetContact{0, 1, friction});
     const std::vector<std::uint32_t> lowest = nodes_below(above, 9);
-    s.apply(SetForce{1, lowest, {0, 0, -6000}});
+    s.apply(scene::SetForce{1, lowest, {0, 0, -6000}});
     s.step(0.1);
     const double before = s.displacement(1)[3 * std::size_t{lowest[0]}];
-    s.apply(SetForce{1, lowest, {1200, 0, -6000}});
+    s.apply(scene::SetForce{1, lowest, {1200, 0, -6000}});
     s.step(0.1);
     way.push_back(s.displacement(1)[3 * std::size_t{lowest[0]}] - before);
     const Vec3 up = sum_of_forces(s, 1);
@@ -126,20 +127,20 @@ TEST(StaticMeetings, FarApartNothingIsDifferent) {
 
 /// What would pass another object in one step is held where it would enter.
 TEST(StaticMeetings, NothingJumpsThrough) {
-  Simulation s(one_thread(), {});
-  const Model above = hanging(3, 3, 2, {3.7, 4.1, 10.5});
+  scene::Simulation s(one_thread(), {});
+  const model::Model above = hanging(3, 3, 2, {3.7, 4.1, 10.5});
   add_static(s, "below", block(5, 5, 2, {}, true));
   add_static(s, "above", above);
-  s.apply(SetContact{0, 1, 0});
+  s.apply(scene::SetContact{0, 1, 0});
   s.step(0.1);
-  Load push;
+  contact::Load push;
   const std::vector<std::uint32_t> lowest = nodes_below(above, 11);
   for (const std::uint32_t node : lowest)
     push.force[node] = {0, 0, -100000};
-  Elastostatic alone(above, nullptr, one_thread());
+  statics::Elastostatic alone(above, nullptr, one_thread());
   alone.update(push);
   ASSERT_LT(alone.displacement()[3 * std::size_t{lowest[0]} + 2], -3);
-  s.apply(SetForce{1, lowest, {0, 0, -100000}});
+  s.apply(scene::SetForce{1, lowest, {0, 0, -100000}});
   s.step(0.1);
   const Vec3 up = sum_of_forces(s, 1);
   EXPECT_GT(up.z, 0);
@@ -149,18 +150,18 @@ TEST(StaticMeetings, NothingJumpsThrough) {
 }
 
 TEST(StaticMeetings, AnInstrumentPressesOneOnAnother) {
-  Simulation s(one_thread(), {});
+  scene::Simulation s(one_thread(), {});
   // A beam that is held at one end over a block.
-  Model beam = block(8, 2, 1, {-8, 6, 8.4});
-  for (Node& node : beam.nodes)
+  model::Model beam = block(8, 2, 1, {-8, 6, 8.4});
+  for (model::Node& node : beam.nodes)
     if (node.position.x < -7)
-      node.fixed = fixed_all;
+      node.fixed = model::fixed_all;
   add_static(s, "below", block(5, 5, 2, {}, true));
   add_static(s, "beam", beam);
-  s.apply(SetContact{0, 1, 0.2});
-  s.apply(SetInstrument{0, ball_of(3), {{14, 10, 15.4}, {}}, "ball"});
+  s.apply(scene::SetContact{0, 1, 0.2});
+  s.apply(scene::SetInstrument{0, ball_of(3), {{14, 10, 15.4}, {}}, "ball"});
   for (int k = 0; k < 15; ++k) {
-    s.apply(MoveInstrument{0, Vec3{14, 10, 15.4 - 0.1 * (k + 1)}, {}, 0.05});
+    s.apply(scene::MoveInstrument{0, Vec3{14, 10, 15.4 - 0.1 * (k + 1)}, {}, 0.05});
     s.step(0.05);
     EXPECT_GT(least_gap(s, 0, 1), 0) << k;
   }
@@ -175,44 +176,44 @@ TEST(StaticMeetings, AnInstrumentPressesOneOnAnother) {
 /// The shape of two steps is what both stages say of the forces that are told.
 TEST(StaticMeetings, StagesOfTwoStepsAreMet) {
   for (const double threshold : {1e30, 1e5}) {
-    Simulation s(one_thread(), {});
-    const Model above = hanging(3, 3, 2, {3.7, 4.1, 8.1});
+    scene::Simulation s(one_thread(), {});
+    const model::Model above = hanging(3, 3, 2, {3.7, 4.1, 8.1});
     add_static(s, "below", block(5, 5, 2, {}, true));
     add_static(s, "above", above);
     const auto second = [&] {
-      Model stiffer = above;
-      for (Material& m : stiffer.materials)
+      model::Model stiffer = above;
+      for (model::Material& m : stiffer.materials)
         m.young *= 4;
       return stiffer;
     }();
-    const TwoStepOptions options{.threshold = threshold};
-    s.apply(SetTwoStep{1, options, {}, std::make_shared<const Model>(second)});
-    s.apply(SetContact{0, 1, 0});
+    const statics::TwoStepOptions options{.threshold = threshold};
+    s.apply(scene::SetTwoStep{1, options, {}, std::make_shared<const model::Model>(second)});
+    s.apply(scene::SetContact{0, 1, 0});
     const std::vector<std::uint32_t> lowest = nodes_below(above, 9);
     for (int k = 1; k <= 3; ++k) {
-      Load push;
+      contact::Load push;
       for (const std::uint32_t node : lowest)
         push.force[node] = {0, 0, -20000.0 * k};
-      s.apply(SetForce{1, lowest, {0, 0, -20000.0 * k}});
+      s.apply(scene::SetForce{1, lowest, {0, 0, -20000.0 * k}});
       s.step(0.1);
       EXPECT_GT(least_gap(s, 0, 1), 0);
       const Vec3 up = sum_of_forces(s, 1);
       EXPECT_GT(up.z, 0);
       EXPECT_LE(norm(up + sum_of_forces(s, 0)), 1e-12 * norm(up));
       EXPECT_LE(miss_of_balance(s, 0, {}), balance_met);
-      for (const NodeVector& f : s.contact_forces(1))
+      for (const contact::NodeVector& f : s.contact_forces(1))
         push.force[f.node] += f.value;
-      Elastostatic first(above, nullptr, one_thread());
-      TwoStep both(above, compliance_of_factor([&] {
-                     return Factor(stiffness_matrix(second), one_thread());
-                   }),
-                   one_thread(), options);
+      statics::Elastostatic first(above, nullptr, one_thread());
+      statics::TwoStep both(above, compliance::compliance_of_factor([&] {
+                              return linalg::Factor(fem::stiffness_matrix(second), one_thread());
+                            }),
+                            one_thread(), options);
       both.update(first, push);
       const std::span<const double> u = both.displacement(first);
       double miss = 0, largest = 0;
       for (std::size_t i = 0; i < u.size(); ++i) {
-        miss = larger(miss, std::abs(u[i] - s.displacement(1)[i]));
-        largest = larger(largest, std::abs(u[i]));
+        miss = numeric::larger(miss, std::abs(u[i] - s.displacement(1)[i]));
+        largest = numeric::larger(largest, std::abs(u[i]));
       }
       EXPECT_LE(miss, balance_met * largest);
     }
@@ -220,9 +221,9 @@ TEST(StaticMeetings, StagesOfTwoStepsAreMet) {
 }
 
 /// Two arms along x, half an element apart, held at one end.
-Model fork() {
-  Model model = block(6, 2, 1, {});
-  const Model other = block(6, 2, 1, {0, 0, 1.5 * block_edge});
+model::Model fork() {
+  model::Model model = block(6, 2, 1, {});
+  const model::Model other = block(6, 2, 1, {0, 0, 1.5 * block_edge});
   const auto first = static_cast<std::uint32_t>(model.nodes.size());
   model.nodes.insert(model.nodes.end(), other.nodes.begin(), other.nodes.end());
   for (Triangle t : other.triangles) {
@@ -236,27 +237,27 @@ Model fork() {
     model.tetrahedra.push_back(t);
     model.tetrahedron_material.push_back(0);
   }
-  for (Node& node : model.nodes)
+  for (model::Node& node : model.nodes)
     if (node.position.x == 0)
-      node.fixed = fixed_all;
+      node.fixed = model::fixed_all;
   return model;
 }
 
 TEST(StaticMeetings, TheArmsOfAForkTouch) {
   for (const bool meets : {true, false}) {
-    Simulation s(one_thread(), {});
-    const Model model = fork();
+    scene::Simulation s(one_thread(), {});
+    const model::Model model = fork();
     add_static(s, "fork", model);
     if (meets)
-      s.apply(SetContact{0, 0, 0.3});
+      s.apply(scene::SetContact{0, 0, 0.3});
     std::vector<std::uint32_t> upper;
-    Load push;
+    contact::Load push;
     for (std::uint32_t i = 0; i < model.nodes.size(); ++i)
       if (model.nodes[i].position.z == 2.5 * block_edge) {
         upper.push_back(i);
         push.force[i] = {0, 0, -400};
       }
-    s.apply(SetForce{0, upper, {0, 0, -400}});
+    s.apply(scene::SetForce{0, upper, {0, 0, -400}});
     for (int k = 0; k < 3; ++k)
       s.step(0.1);
     if (meets) {
@@ -274,20 +275,20 @@ TEST(StaticMeetings, TheArmsOfAForkTouch) {
 TEST(StaticMeetings, WhatFailsIsTakenBack) {
   std::vector<std::vector<double>> shapes;
   for (const bool fails : {true, false}) {
-    Simulation s(one_thread(), {.guard = true});
-    const Model above = hanging(3, 3, 2, {3.7, 4.1, 8.3});
+    scene::Simulation s(one_thread(), {.guard = true});
+    const model::Model above = hanging(3, 3, 2, {3.7, 4.1, 8.3});
     add_static(s, "below", block(5, 5, 2, {}, true));
     add_static(s, "above", above);
-    s.apply(SetContact{0, 1, 0.3});
-    s.apply(SetInstrument{0, ball_of(3), {{1, 1, 11.2}, {}}, "ball"});
+    s.apply(scene::SetContact{0, 1, 0.3});
+    s.apply(scene::SetInstrument{0, ball_of(3), {{1, 1, 11.2}, {}}, "ball"});
     const std::vector<std::uint32_t> lowest = nodes_below(above, 9);
     for (int k = 1; k <= 4; ++k) {
-      s.apply(SetForce{1, lowest, {3000.0 * k, 0, -20000.0 * k}});
-      s.apply(MoveInstrument{0, Vec3{1, 1, 11.2 - 0.2 * k}, {}, 0.1});
+      s.apply(scene::SetForce{1, lowest, {3000.0 * k, 0, -20000.0 * k}});
+      s.apply(scene::MoveInstrument{0, Vec3{1, 1, 11.2 - 0.2 * k}, {}, 0.1});
       if (fails && k == 3) {
-        s.apply(SetForce{1, {lowest[0]}, {1e15, 0, 0}}); // which is noticed when it is found
+        s.apply(scene::SetForce{1, {lowest[0]}, {1e15, 0, 0}}); // which is noticed when it is found
         EXPECT_THROW(s.step(0.1), Error);
-        s.apply(SetForce{1, lowest, {3000.0 * k, 0, -20000.0 * k}});
+        s.apply(scene::SetForce{1, lowest, {3000.0 * k, 0, -20000.0 * k}});
       }
       s.step(0.1);
     }
@@ -301,19 +302,19 @@ TEST(StaticMeetings, WhatFailsIsTakenBack) {
 }
 
 TEST(StaticMeetings, WhatIsDisplacedPresses) {
-  Simulation s(one_thread(), {});
-  const Model above = hanging(3, 3, 2, {3.7, 4.1, 8.1});
+  scene::Simulation s(one_thread(), {});
+  const model::Model above = hanging(3, 3, 2, {3.7, 4.1, 8.1});
   add_static(s, "below", block(5, 5, 2, {}, true));
   add_static(s, "above", above);
-  s.apply(SetContact{0, 1, 0});
+  s.apply(scene::SetContact{0, 1, 0});
   std::vector<std::uint32_t> middle;
-  Load load;
+  contact::Load load;
   for (std::uint32_t i = 0; i < above.nodes.size(); ++i)
     if (std::abs(above.nodes[i].position.z - 12.1) < 1e-9) {
       middle.push_back(i);
       load.displacement[i] = {0.2, 0, -1};
     }
-  s.apply(SetDisplacement{1, middle, {0.2, 0, -1}});
+  s.apply(scene::SetDisplacement{1, middle, {0.2, 0, -1}});
   s.step(0.1);
   const Vec3 down = sum_of_forces(s, 0);
   EXPECT_LT(down.z, 0);
@@ -322,7 +323,7 @@ TEST(StaticMeetings, WhatIsDisplacedPresses) {
   EXPECT_LE(miss_of_balance(s, 1, load), balance_met);
   for (const std::uint32_t i : middle)
     EXPECT_EQ(vector_at(s.displacement(1), i), Vec3(0.2, 0, -1));
-  s.apply(Release{1, middle});
+  s.apply(scene::Release{1, middle});
   s.step(0.1);
   EXPECT_TRUE(s.contact_forces(0).empty());
   for (const double u : s.displacement(1))
@@ -331,21 +332,21 @@ TEST(StaticMeetings, WhatIsDisplacedPresses) {
 
 /// Of three in a row, who is in the midst hands on what presses it.
 TEST(StaticMeetings, ThreeInARow) {
-  Simulation s(one_thread(), {});
-  Model middle = block(3, 3, 1, {3.7, 4.1, 8.2});
-  for (Node& node : middle.nodes)
+  scene::Simulation s(one_thread(), {});
+  model::Model middle = block(3, 3, 1, {3.7, 4.1, 8.2});
+  for (model::Node& node : middle.nodes)
     if (node.position.x < 4)
-      node.fixed = fixed_x | fixed_y;
-  middle.nodes[0].fixed = fixed_all;
-  const Model above = hanging(2, 2, 2, {5.9, 6.3, 12.5});
+      node.fixed = model::fixed_x | model::fixed_y;
+  middle.nodes[0].fixed = model::fixed_all;
+  const model::Model above = hanging(2, 2, 2, {5.9, 6.3, 12.5});
   add_static(s, "below", block(5, 5, 2, {}, true));
   add_static(s, "middle", middle);
   add_static(s, "above", above);
-  s.apply(SetContact{1, 0, 0});
-  s.apply(SetContact{2, 1, 0});
+  s.apply(scene::SetContact{1, 0, 0});
+  s.apply(scene::SetContact{2, 1, 0});
   const std::vector<std::uint32_t> lowest = nodes_below(above, 13);
   for (int k = 1; k <= 4; ++k) {
-    s.apply(SetForce{2, lowest, {0, 0, -30000.0 * k}});
+    s.apply(scene::SetForce{2, lowest, {0, 0, -30000.0 * k}});
     s.step(0.1);
   }
   EXPECT_GT(sum_of_forces(s, 2).z, 0);
@@ -358,23 +359,23 @@ TEST(StaticMeetings, ThreeInARow) {
 
 /// A hand's instrument gives way to both that it presses together.
 TEST(StaticMeetings, ALedInstrumentFeelsBoth) {
-  Simulation s(one_thread(), {});
-  Model beam = block(8, 2, 1, {-8, 6, 8.4});
-  for (Node& node : beam.nodes)
+  scene::Simulation s(one_thread(), {});
+  model::Model beam = block(8, 2, 1, {-8, 6, 8.4});
+  for (model::Node& node : beam.nodes)
     if (node.position.x < -7)
-      node.fixed = fixed_all;
+      node.fixed = model::fixed_all;
   add_static(s, "below", block(5, 5, 2, {}, true));
   add_static(s, "beam", beam);
-  s.apply(SetContact{0, 1, 0.2});
-  s.apply(SetInstrument{0, ball_of(3), {{14, 10, 15.5}, {}}, "ball"});
-  s.apply(SetCoupling{0, Coupling{1e5, 10}});
+  s.apply(scene::SetContact{0, 1, 0.2});
+  s.apply(scene::SetInstrument{0, ball_of(3), {{14, 10, 15.5}, {}}, "ball"});
+  s.apply(scene::SetCoupling{0, contact::Coupling{1e5, 10}});
   for (int k = 0; k < 60; ++k) {
     if (k < 40)
-      s.apply(MoveInstrument{0, Vec3{14, 10, 15.5 - 0.05 * (k + 1)}, {}, 0.01});
+      s.apply(scene::MoveInstrument{0, Vec3{14, 10, 15.5 - 0.05 * (k + 1)}, {}, 0.01});
     s.step(0.01);
     EXPECT_GT(least_gap(s, 0, 1), 0) << k;
   }
-  const InstrumentReport ball = s.instrument(0);
+  const scene::InstrumentReport ball = s.instrument(0);
   ASSERT_TRUE(ball.hand);
   EXPECT_GT(ball.force.z, 1e4);
   // At rest the spring bears what presses.
@@ -383,4 +384,4 @@ TEST(StaticMeetings, ALedInstrumentFeelsBoth) {
 }
 
 } // namespace
-} // namespace gewebe
+} // namespace gewebe::test

@@ -18,9 +18,9 @@ using namespace gewebe::test;
 namespace {
 
 /// Force on each node by the springs at displacement u, as the non-linear model has it.
-std::vector<double> spring_forces(const Model& model, const std::vector<double>& u) {
+std::vector<double> spring_forces(const model::Model& model, const std::vector<double>& u) {
   std::vector<double> f(u.size());
-  for (const Spring& s : model.springs) {
+  for (const model::Spring& s : model.springs) {
     const auto moved = [&](std::size_t i) {
       return model.nodes[i].position + Vec3{u[3 * i], u[3 * i + 1], u[3 * i + 2]};
     };
@@ -43,7 +43,7 @@ double largest(const std::vector<double>& x) {
 }
 
 /// Central differences of the forces against K u; relative to ‖K u‖.
-double difference_error(const Model& model) {
+double difference_error(const model::Model& model) {
   const std::vector<double> u = random_vector(3 * model.nodes.size(), 5);
   const double h = 1e-5;
   std::vector<double> plus = u, minus = u, ku(u.size());
@@ -51,7 +51,7 @@ double difference_error(const Model& model) {
     plus[i] *= h;
     minus[i] *= -h;
   }
-  multiply_stiffness(model, u, ku);
+  fem::multiply_stiffness(model, u, ku);
   const std::vector<double> fp = spring_forces(model, plus), fm = spring_forces(model, minus);
   double error = 0;
   for (std::size_t i = 0; i < u.size(); ++i)
@@ -62,17 +62,17 @@ double difference_error(const Model& model) {
 } // namespace
 
 TEST(Stiffness, EqualsDifferencesOfTheForces) {
-  BuildOptions bend;
+  model::BuildOptions bend;
   bend.bend = true;
-  const Model model = model_of(ball(2), 4, bend);
+  const model::Model model = model_of(ball(2), 4, bend);
   EXPECT_LE(difference_error(model), 1e-8);
   EXPECT_LE(difference_error(stretched(model, 1.2)), 1e-8);
   EXPECT_LE(difference_error(stretched(model, 0.9)), 1e-8);
   // The check can fail: K of other rest lengths is another matrix.
-  const Model other = stretched(model, 1.2);
+  const model::Model other = stretched(model, 1.2);
   std::vector<double> a(3 * model.nodes.size()), b(a.size());
-  multiply_stiffness(model, random_vector(a.size(), 5), a);
-  multiply_stiffness(other, random_vector(a.size(), 5), b);
+  fem::multiply_stiffness(model, random_vector(a.size(), 5), a);
+  fem::multiply_stiffness(other, random_vector(a.size(), 5), b);
   double apart = 0;
   for (std::size_t i = 0; i < a.size(); ++i)
     apart = test::larger(apart, std::abs(a[i] - b[i]));
@@ -80,10 +80,10 @@ TEST(Stiffness, EqualsDifferencesOfTheForces) {
 }
 
 TEST(Stiffness, MatrixAgreesWithSprings) {
-  Model model = stretched(model_of(ball(2)), 1.1);
-  model.nodes[3].fixed = fixed_x;
-  model.nodes[5].fixed = fixed_y | fixed_z;
-  const StiffnessMatrix k = stiffness_matrix(model);
+  model::Model model = stretched(model_of(ball(2)), 1.1);
+  model.nodes[3].fixed = model::fixed_x;
+  model.nodes[5].fixed = model::fixed_y | model::fixed_z;
+  const linalg::StiffnessMatrix k = fem::stiffness_matrix(model);
   ASSERT_EQ(k.column_start.size(), k.order() + 1);
   ASSERT_EQ(k.order(), 3 * (model.nodes.size() - 4) - 3);
   for (std::size_t c = 0; c < k.order(); ++c) {
@@ -96,33 +96,34 @@ TEST(Stiffness, MatrixAgreesWithSprings) {
   }
   const std::vector<double> x = random_vector(k.order(), 1);
   std::vector<double> y(k.order()), u(3 * model.nodes.size()), f(u.size());
-  multiply(k, x, y);
+  linalg::multiply(k, x, y);
   for (std::size_t r = 0; r < k.order(); ++r)
     u[static_cast<std::size_t>(k.axis_of_row[r])] = x[r];
-  multiply_stiffness(model, u, f);
+  fem::multiply_stiffness(model, u, f);
   for (std::size_t r = 0; r < k.order(); ++r)
-    EXPECT_NEAR(y[r], f[static_cast<std::size_t>(k.axis_of_row[r])], 1e-12 * stiffness_norm(k));
+    EXPECT_NEAR(y[r], f[static_cast<std::size_t>(k.axis_of_row[r])],
+                1e-12 * linalg::stiffness_norm(k));
 }
 
 TEST(Stiffness, IsSymmetricAndNoMotionCostsLessThanNothing) {
-  const Model model = model_of(ball(2));
-  const StiffnessMatrix k = stiffness_matrix(model);
+  const model::Model model = model_of(ball(2));
+  const linalg::StiffnessMatrix k = fem::stiffness_matrix(model);
   const std::vector<double> a = random_vector(k.order(), 2), b = random_vector(k.order(), 3);
   std::vector<double> ka(k.order()), kb(k.order());
-  multiply(k, a, ka);
-  multiply(k, b, kb);
+  linalg::multiply(k, a, ka);
+  linalg::multiply(k, b, kb);
   const auto dot_of = [](const auto& x, const auto& y) {
     return std::inner_product(x.begin(), x.end(), y.begin(), 0.0);
   };
-  EXPECT_NEAR(dot_of(a, kb), dot_of(b, ka), 1e-11 * stiffness_norm(k));
+  EXPECT_NEAR(dot_of(a, kb), dot_of(b, ka), 1e-11 * linalg::stiffness_norm(k));
   EXPECT_GT(dot_of(a, ka), 0);
 }
 
 TEST(Stiffness, ForcesOfASolutionAndReactionsCancel) {
-  const Model model = model_of(ball(2));
+  const model::Model model = model_of(ball(2));
   const std::vector<double> u = random_vector(3 * model.nodes.size(), 4);
   std::vector<double> f(u.size());
-  multiply_stiffness(model, u, f);
+  fem::multiply_stiffness(model, u, f);
   const double scale = largest(f);
   Vec3 sum, turn;
   for (std::size_t i = 0; i < model.nodes.size(); ++i) {
@@ -135,40 +136,41 @@ TEST(Stiffness, ForcesOfASolutionAndReactionsCancel) {
 }
 
 TEST(Stiffness, OneSpringByHand) {
-  Model model;
+  model::Model model;
   model.name = "bar";
   model.materials.push_back({});
   model.nodes.resize(2);
-  model.nodes[0].fixed = fixed_all;
+  model.nodes[0].fixed = model::fixed_all;
   model.nodes[1].position = {3, 4, 0};
-  model.springs.push_back({0, 1, SpringKind::edge, 10, 0, 4}); // length 5, rest 4
-  const StiffnessMatrix k = stiffness_matrix(model);
+  model.springs.push_back({0, 1, model::SpringKind::edge, 10, 0, 4}); // length 5, rest 4
+  const linalg::StiffnessMatrix k = fem::stiffness_matrix(model);
   // n = (0.6, 0.8, 0), 1 - l0/l = 0.2: 10 (nnᵀ + 0.2 (I - nnᵀ))
   const std::vector<double> expected{
       10 * (0.36 + 0.2 * 0.64), 10 * 0.8 * 0.48, 0, 10 * (0.64 + 0.2 * 0.36), 0, 10 * 0.2};
   ASSERT_EQ(k.value.size(), expected.size());
   for (std::size_t i = 0; i < expected.size(); ++i)
     EXPECT_NEAR(k.value[i], expected[i], 1e-14);
-  EXPECT_NEAR(stiffness_norm(k), 10.96, 1e-12);
+  EXPECT_NEAR(linalg::stiffness_norm(k), 10.96, 1e-12);
 }
 
 TEST(Stiffness, FurtherAxesCanBeLeftOut) {
-  const Model model = model_of(ball(1));
+  const model::Model model = model_of(ball(1));
   std::vector<std::uint8_t> fixed(3 * model.nodes.size());
   fixed[4] = fixed[7] = 1;
-  const StiffnessMatrix all = stiffness_matrix(model), some = stiffness_matrix(model, fixed);
+  const linalg::StiffnessMatrix all = fem::stiffness_matrix(model),
+                                some = fem::stiffness_matrix(model, fixed);
   EXPECT_EQ(some.order() + 2, all.order());
   EXPECT_EQ(some.row_of_axis[4], -1);
   EXPECT_EQ(some.row_of_axis[5], 4);
 }
 
 TEST(Stiffness, RefusesWhatCannotMoveOrIsNoNumber) {
-  Model model = model_of(ball(1));
-  Model held = model;
-  for (Node& n : held.nodes)
-    n.fixed = fixed_all;
-  EXPECT_THROW(stiffness_matrix(held), Error);
-  for (Spring& s : model.springs)
+  model::Model model = model_of(ball(1));
+  model::Model held = model;
+  for (model::Node& n : held.nodes)
+    n.fixed = model::fixed_all;
+  EXPECT_THROW(fem::stiffness_matrix(held), Error);
+  for (model::Spring& s : model.springs)
     s.stiffness = 1.7e308;
-  EXPECT_THROW(stiffness_matrix(model), Error);
+  EXPECT_THROW(fem::stiffness_matrix(model), Error);
 }

@@ -42,41 +42,41 @@ void write_bytes(const std::string& path, const Bytes& bytes) {
              static_cast<std::streamsize>(bytes.size()));
 }
 
-std::uint64_t write_store(const std::string& path, const Model& model,
+std::uint64_t write_store(const std::string& path, const model::Model& model,
                           const std::vector<std::uint32_t>& nodes, bool single = false,
                           int threads = 1, double compressed = 0) {
-  const StiffnessMatrix k = stiffness_matrix(model);
-  StiffnessFacts facts;
-  StiffnessCheck check;
-  const Factor factor = checked_factor(model, k, {}, check);
+  const linalg::StiffnessMatrix k = fem::stiffness_matrix(model);
+  formats::StiffnessFacts facts;
+  linalg::StiffnessCheck check;
+  const linalg::Factor factor = linalg::checked_factor(model, k, {}, check);
   facts.object = model.name;
-  facts.hash = stiffness_hash(model);
+  facts.hash = formats::stiffness_hash(model);
   facts.nodes = model.nodes.size();
   facts.order = k.order();
   facts.norm = check.norm;
   facts.condition = check.condition;
   facts.single = single;
   facts.compressed = compressed;
-  Output output(path, {});
-  StiffnessStoreWriter writer(output);
+  formats::Output output(path, {});
+  formats::StiffnessStoreWriter writer(output);
   writer.begin(facts, k, factor, nodes);
   Context context;
   context.threads = threads;
   double residual = 0;
   if (compressed > 0) {
     std::vector<Vec3> positions;
-    for (const Node& node : model.nodes)
+    for (const model::Node& node : model.nodes)
       positions.push_back(node.position);
-    const CompressedMade made = compress_columns(
+    const columns::CompressedMade made = columns::compress_columns(
         positions, nodes, compressed,
-        [&](std::span<const std::uint32_t> of, ColumnSink& sink) {
-          return compliance_columns(k, factor, check.norm, of, context, sink);
+        [&](std::span<const std::uint32_t> of, columns::ColumnSink& sink) {
+          return columns::compliance_columns(k, factor, check.norm, of, context, sink);
         },
         context);
     writer.write_compressed(made);
     residual = made.residual;
   } else {
-    residual = compliance_columns(k, factor, check.norm, nodes, context, writer);
+    residual = columns::compliance_columns(k, factor, check.norm, nodes, context, writer);
   }
   writer.end(std::max(residual, check.residual));
   writer.close();
@@ -85,26 +85,26 @@ std::uint64_t write_store(const std::string& path, const Model& model,
 }
 
 /// Everything that a store says, as bytes.
-std::vector<double> contents(const StiffnessStore& store) {
+std::vector<double> contents(const formats::StiffnessStore& store) {
   std::vector<double> all;
   const auto add = [&](const auto& list) {
     all.push_back(static_cast<double>(list.size()));
     all.insert(all.end(), list.begin(), list.end());
   };
   for (const std::string& name : store.objects()) {
-    const StiffnessFacts facts = store.facts(name);
+    const formats::StiffnessFacts facts = store.facts(name);
     add(facts.object);
     for (const double value :
          {static_cast<double>(facts.hash >> 32), static_cast<double>(facts.hash & UINT32_MAX),
           static_cast<double>(facts.nodes), static_cast<double>(facts.order), facts.norm,
           facts.condition, facts.residual, facts.single ? 1.0 : 0.0})
       all.push_back(value);
-    const StiffnessMatrix k = store.matrix(facts);
+    const linalg::StiffnessMatrix k = store.matrix(facts);
     add(k.column_start);
     add(k.row);
     add(k.value);
     add(k.axis_of_row);
-    const FactorData l = store.factor(facts).data();
+    const linalg::FactorData l = store.factor(facts).data();
     for (const auto* list : {&l.permutation, &l.column_count, &l.super, &l.pi, &l.px, &l.s})
       add(*list);
     add(l.x);
@@ -122,17 +122,17 @@ std::vector<double> contents(const StiffnessStore& store) {
 
 std::string refusal(const std::string& path) {
   try {
-    (void)contents(StiffnessStore(path));
+    (void)contents(formats::StiffnessStore(path));
   } catch (const Error& error) {
     return error.place() + ": " + error.what();
   }
   return "accepted";
 }
 
-Model small_model() {
-  Model model = model_of(octahedron(), 1);
-  model.nodes[0].fixed = model.nodes[2].fixed = fixed_all;
-  model.nodes[4].fixed = fixed_x | fixed_z;
+model::Model small_model() {
+  model::Model model = model_of(octahedron(), 1);
+  model.nodes[0].fixed = model.nodes[2].fixed = model::fixed_all;
+  model.nodes[4].fixed = model::fixed_x | model::fixed_z;
   model.name = "two/parts of it";
   return model;
 }
@@ -142,7 +142,7 @@ Model small_model() {
 TEST(RawFile, WithoutANameIsOnTheDiskOrInMemory) {
   const ScratchFile beside(".part");
   for (const std::string& place : {beside.path(), std::string("/proc/none")}) { // that has no such
-    RawFile file = RawFile::nameless(place, "test");
+    formats::RawFile file = formats::RawFile::nameless(place, "test");
     file.write(3, "abc", 3);
     EXPECT_EQ(file.size(), 6U);
     std::ifstream again(file.path());
@@ -152,7 +152,7 @@ TEST(RawFile, WithoutANameIsOnTheDiskOrInMemory) {
     EXPECT_NE(std::string(target.data()).find(" (deleted)"), std::string::npos);
     EXPECT_EQ(std::string(target.data()).starts_with("/memfd:"), place == "/proc/none");
   }
-  EXPECT_THROW((void)RawFile::nameless("/nowhere/x", "test"), Error);
+  EXPECT_THROW((void)formats::RawFile::nameless("/nowhere/x", "test"), Error);
 }
 
 TEST(Crc32c, KnownValues) {
@@ -165,29 +165,29 @@ TEST(Crc32c, KnownValues) {
 }
 
 TEST(Store, GivesBackTheSameBits) {
-  const Model model = small_model();
-  const StiffnessMatrix k = stiffness_matrix(model);
+  const model::Model model = small_model();
+  const linalg::StiffnessMatrix k = fem::stiffness_matrix(model);
   for (const bool single : {false, true}) {
     const ScratchFile file(".h5");
     write_store(file.path(), model, {0, 1, 5}, single);
-    const StiffnessStore store(file.path());
+    const formats::StiffnessStore store(file.path());
     EXPECT_EQ(store.objects(), std::vector<std::string>{"two_parts of it"});
-    const StiffnessFacts facts = store.facts(model);
+    const formats::StiffnessFacts facts = store.facts(model);
     EXPECT_EQ(facts.object, model.name);
     EXPECT_EQ(facts.order, k.order());
     EXPECT_EQ(facts.single, single);
-    EXPECT_LE(facts.residual, max_backward_error);
-    const StiffnessMatrix read = store.matrix(facts);
+    EXPECT_LE(facts.residual, linalg::max_backward_error);
+    const linalg::StiffnessMatrix read = store.matrix(facts);
     EXPECT_EQ(read.value, k.value);
     EXPECT_EQ(read.row, k.row);
     EXPECT_EQ(read.column_start, k.column_start);
     EXPECT_EQ(read.axis_of_row, k.axis_of_row);
     EXPECT_EQ(read.row_of_axis, k.row_of_axis);
-    const Factor factor(k, {}), again = store.factor(facts);
+    const linalg::Factor factor(k, {}), again = store.factor(facts);
     const std::vector<double> f = random_vector(3 * model.nodes.size(), 1);
     std::vector<double> a(f.size()), b(f.size());
-    solve_axes(k, factor, f, a);
-    solve_axes(k, again, f, b);
+    linalg::solve_axes(k, factor, f, a);
+    linalg::solve_axes(k, again, f, b);
     EXPECT_EQ(a, b);
     const auto columns = store.columns(facts);
     ASSERT_NE(columns, nullptr);
@@ -198,7 +198,7 @@ TEST(Store, GivesBackTheSameBits) {
     for (std::size_t axis = 0; axis < 3; ++axis) {
       std::fill(a.begin(), a.end(), 0.0);
       a[3 + axis] = 1;
-      solve_axes(k, factor, a, b);
+      linalg::solve_axes(k, factor, a, b);
       for (std::size_t i = 0; i < b.size(); ++i)
         EXPECT_EQ(row[axis * b.size() + i],
                   single ? static_cast<double>(static_cast<float>(b[i])) : b[i]);
@@ -207,7 +207,7 @@ TEST(Store, GivesBackTheSameBits) {
 }
 
 TEST(Store, CompressedColumnsAreWithinTheirBoundAndReadByChunk) {
-  const Model model = model_of(ball(3));
+  const model::Model model = model_of(ball(3));
   std::vector<std::uint32_t> nodes;
   for (std::uint32_t i = 0; i < model.nodes.size(); i += i % 4 == 0 ? 2 : 1)
     nodes.push_back(i);
@@ -217,10 +217,10 @@ TEST(Store, CompressedColumnsAreWithinTheirBoundAndReadByChunk) {
   EXPECT_EQ(write_store(again.path(), model, nodes, false, 5, 1e-3), digest);
   EXPECT_EQ(bytes_of(small.path()), bytes_of(again.path()));
   EXPECT_NE(write_store(again.path(), model, nodes, false, 5, 1e-4), digest);
-  const StiffnessStore of_plain(plain.path()), of_small(small.path());
-  const StiffnessFacts facts = of_small.facts(model);
+  const formats::StiffnessStore of_plain(plain.path()), of_small(small.path());
+  const formats::StiffnessFacts facts = of_small.facts(model);
   EXPECT_EQ(facts.compressed, 1e-3);
-  const StiffnessSizes sizes = of_small.sizes(facts);
+  const formats::StiffnessSizes sizes = of_small.sizes(facts);
   EXPECT_EQ(sizes.touched, nodes.size());
   EXPECT_LT(sizes.column_bytes, of_plain.sizes(of_plain.facts(model)).column_bytes / 4);
   const auto exact = of_plain.columns(of_plain.facts(model));
@@ -246,15 +246,15 @@ TEST(Store, CompressedColumnsAreWithinTheirBoundAndReadByChunk) {
 }
 
 TEST(Store, CompressedColumnsThatContradictThemselvesAreRefused) {
-  const Model model = small_model();
+  const model::Model model = small_model();
   const ScratchFile file(".h5");
   const auto write = [&](auto&& spoil) {
-    StiffnessCheck check;
-    const StiffnessMatrix k = stiffness_matrix(model);
-    const Factor factor = checked_factor(model, k, {}, check);
-    StiffnessFacts facts;
+    linalg::StiffnessCheck check;
+    const linalg::StiffnessMatrix k = fem::stiffness_matrix(model);
+    const linalg::Factor factor = linalg::checked_factor(model, k, {}, check);
+    formats::StiffnessFacts facts;
     facts.object = "x";
-    facts.hash = stiffness_hash(model);
+    facts.hash = formats::stiffness_hash(model);
     facts.nodes = model.nodes.size();
     facts.order = k.order();
     facts.norm = check.norm;
@@ -262,17 +262,17 @@ TEST(Store, CompressedColumnsThatContradictThemselvesAreRefused) {
     facts.compressed = 1e-3;
     const std::vector<std::uint32_t> nodes{1, 3, 4};
     std::vector<Vec3> positions;
-    for (const Node& node : model.nodes)
+    for (const model::Node& node : model.nodes)
       positions.push_back(node.position);
-    CompressedMade made =
-        compress_columns(positions, nodes, 1e-3,
-                         [&](std::span<const std::uint32_t> of, ColumnSink& sink) {
-                           return compliance_columns(k, factor, check.norm, of, {}, sink);
-                         },
-                         {});
+    columns::CompressedMade made = columns::compress_columns(
+        positions, nodes, 1e-3,
+        [&](std::span<const std::uint32_t> of, columns::ColumnSink& sink) {
+          return columns::compliance_columns(k, factor, check.norm, of, {}, sink);
+        },
+        {});
     spoil(made);
-    Output output(file.path(), {});
-    StiffnessStoreWriter writer(output);
+    formats::Output output(file.path(), {});
+    formats::StiffnessStoreWriter writer(output);
     writer.begin(facts, k, factor, nodes);
     writer.write_compressed(made);
     writer.end(0);
@@ -280,48 +280,48 @@ TEST(Store, CompressedColumnsThatContradictThemselvesAreRefused) {
     output.commit();
     return refusal(file.path());
   };
-  EXPECT_EQ(write([](CompressedMade&) {}), "accepted");
+  EXPECT_EQ(write([](columns::CompressedMade&) {}), "accepted");
   const auto says = [&](auto&& spoil, const char* what) {
     const std::string said = write(spoil);
     EXPECT_NE(said.find(what), std::string::npos) << said;
   };
-  says([](CompressedMade& m) { m.layout.clusters.node[0] = m.layout.clusters.node[1]; },
+  says([](columns::CompressedMade& m) { m.layout.clusters.node[0] = m.layout.clusters.node[1]; },
        "their nodes");
-  says([](CompressedMade& m) { m.layout.clusters.node.pop_back(); }, "has shape");
-  says([](CompressedMade& m) { --m.layout.clusters.first.back(); }, "their clusters");
-  says([](CompressedMade& m) { m.layout.count.pop_back(); }, "their blocks");
-  says([](CompressedMade& m) { ++m.layout.count[0].narrow; }, "its chunks");
-  says([](CompressedMade& m) { m.layout.count[1].wide = 1U << 31; }, "their blocks");
-  says([](CompressedMade& m) { m.chunks[0].push_back(0); }, "has shape");
-  says([](CompressedMade& m) { m.layout.bound = 0; }, "their bound");
-  says([](CompressedMade& m) { m.layout.relative = NAN; }, "its bound");
+  says([](columns::CompressedMade& m) { m.layout.clusters.node.pop_back(); }, "has shape");
+  says([](columns::CompressedMade& m) { --m.layout.clusters.first.back(); }, "their clusters");
+  says([](columns::CompressedMade& m) { m.layout.count.pop_back(); }, "their blocks");
+  says([](columns::CompressedMade& m) { ++m.layout.count[0].narrow; }, "its chunks");
+  says([](columns::CompressedMade& m) { m.layout.count[1].wide = 1U << 31; }, "their blocks");
+  says([](columns::CompressedMade& m) { m.chunks[0].push_back(0); }, "has shape");
+  says([](columns::CompressedMade& m) { m.layout.bound = 0; }, "their bound");
+  says([](columns::CompressedMade& m) { m.layout.relative = NAN; }, "its bound");
 }
 
 TEST(Store, ColumnsOutliveTheStoreAndMayBeAbsent) {
-  const Model model = small_model();
+  const model::Model model = small_model();
   const ScratchFile file(".h5"), without(".h5");
   write_store(file.path(), model, {3});
-  std::unique_ptr<ColumnSource> columns;
+  std::unique_ptr<columns::ColumnSource> columns;
   {
-    const StiffnessStore store(file.path());
+    const formats::StiffnessStore store(file.path());
     columns = store.columns(store.facts(model));
   }
   std::vector<double> row(9 * model.nodes.size());
   EXPECT_NO_THROW(columns->read(0, row));
   EXPECT_THROW(columns->read(1, row), Error);
   write_store(without.path(), model, {});
-  const StiffnessStore store(without.path());
+  const formats::StiffnessStore store(without.path());
   EXPECT_EQ(store.columns(store.facts(model)), nullptr);
 }
 
 TEST(Store, BoundsAreNeverBelowTheColumns) {
-  const Model model = model_of(ball(3));
+  const model::Model model = model_of(ball(3));
   const ScratchFile file(".h5");
   write_store(file.path(), model, {1, 100});
-  const hdf5::File raw = hdf5::File::open(file.path());
-  const hdf5::Group group = raw.root().group("ball").group("columns");
-  const hdf5::Dataset values = group.dataset("values", hdf5::Number::float64);
-  const hdf5::Dataset bound = group.dataset("bound", hdf5::Number::float32);
+  const formats::hdf5::File raw = formats::hdf5::File::open(file.path());
+  const formats::hdf5::Group group = raw.root().group("ball").group("columns");
+  const formats::hdf5::Dataset values = group.dataset("values", formats::hdf5::Number::float64);
+  const formats::hdf5::Dataset bound = group.dataset("bound", formats::hdf5::Number::float32);
   const std::size_t n = model.nodes.size(), blocks = (n + 255) / 256;
   bound.require_shape({2, 3, blocks});
   std::vector<double> x(18 * n);
@@ -339,7 +339,7 @@ TEST(Store, BoundsAreNeverBelowTheColumns) {
 }
 
 TEST(Store, BytesAreTheSameFromRunToRunAndForAnyThreads) {
-  const Model model = model_of(ball(2));
+  const model::Model model = model_of(ball(2));
   const ScratchFile a(".h5"), b(".h5"), c(".h5");
   std::vector<std::uint32_t> nodes(40);
   for (std::uint32_t i = 0; i < 40; ++i)
@@ -353,31 +353,31 @@ TEST(Store, BytesAreTheSameFromRunToRunAndForAnyThreads) {
 }
 
 TEST(Store, HashFollowsWhatCounts) {
-  const Model model = model_of(ball(1));
-  const std::uint64_t hash = stiffness_hash(model);
-  Model other = model;
+  const model::Model model = model_of(ball(1));
+  const std::uint64_t hash = formats::stiffness_hash(model);
+  model::Model other = model;
   other.name = "other";
   other.springs[3].damping *= 2;
   other.nodes[3].drag *= 2;
-  EXPECT_EQ(stiffness_hash(other), hash);
+  EXPECT_EQ(formats::stiffness_hash(other), hash);
   const auto changes = [&](auto&& change) {
-    Model changed = model;
+    model::Model changed = model;
     change(changed);
-    return stiffness_hash(changed) != hash;
+    return formats::stiffness_hash(changed) != hash;
   };
-  EXPECT_TRUE(changes([](Model& m) { m.springs[3].stiffness *= 1 + 1e-15; }));
-  EXPECT_TRUE(changes([](Model& m) { m.springs[3].rest += 1e-12; }));
-  EXPECT_TRUE(changes([](Model& m) { m.springs.pop_back(); }));
-  EXPECT_TRUE(changes([](Model& m) { m.nodes[2].fixed = fixed_x; }));
-  EXPECT_TRUE(changes([](Model& m) { m.nodes[2].mass *= 2; }));
-  EXPECT_TRUE(changes([](Model& m) { m.nodes[2].position.z += 1e-12; }));
+  EXPECT_TRUE(changes([](model::Model& m) { m.springs[3].stiffness *= 1 + 1e-15; }));
+  EXPECT_TRUE(changes([](model::Model& m) { m.springs[3].rest += 1e-12; }));
+  EXPECT_TRUE(changes([](model::Model& m) { m.springs.pop_back(); }));
+  EXPECT_TRUE(changes([](model::Model& m) { m.nodes[2].fixed = model::fixed_x; }));
+  EXPECT_TRUE(changes([](model::Model& m) { m.nodes[2].mass *= 2; }));
+  EXPECT_TRUE(changes([](model::Model& m) { m.nodes[2].position.z += 1e-12; }));
 }
 
 TEST(Store, OfAnotherModelIsRefusedByName) {
   const ScratchFile file(".h5");
-  Model model = small_model();
+  model::Model model = small_model();
   write_store(file.path(), model, {});
-  const StiffnessStore store(file.path());
+  const formats::StiffnessStore store(file.path());
   model.name = "renamed"; // is still the same model
   EXPECT_NO_THROW((void)store.facts(model));
   model.springs[0].stiffness *= 2;
@@ -404,26 +404,26 @@ TEST(Store, WhatIsNoStoreIsRefusedByName) {
   EXPECT_EQ(refusal(file.path()),
             file.path() + ": byte 0: no HDF5 file, expected the magic bytes of one");
   const auto with_root = [&](auto&& fill) {
-    hdf5::File made = hdf5::File::create(file.path());
+    formats::hdf5::File made = formats::hdf5::File::create(file.path());
     fill(made.root());
     made.close();
     return refusal(file.path()).substr(file.path().size() + 2);
   };
-  EXPECT_EQ(with_root([](hdf5::Group&) {}),
+  EXPECT_EQ(with_root([](formats::hdf5::Group&) {}),
             "is an HDF5 file of another kind, expected a gewebe stiffness store");
-  EXPECT_EQ(with_root([](hdf5::Group& root) { root.set("format", "gewebe results"); }),
+  EXPECT_EQ(with_root([](formats::hdf5::Group& root) { root.set("format", "gewebe results"); }),
             "is a gewebe results, expected a gewebe stiffness store");
-  EXPECT_EQ(with_root([](hdf5::Group& root) {
+  EXPECT_EQ(with_root([](formats::hdf5::Group& root) {
               root.set("format", "gewebe stiffness store");
               root.set("version", std::int64_t{2});
             }),
             "is of version 2, expected 1");
-  EXPECT_EQ(with_root([](hdf5::Group& root) {
+  EXPECT_EQ(with_root([](formats::hdf5::Group& root) {
               root.set("format", "gewebe stiffness store");
               root.set("version", "1");
             }),
             "'/': attribute version is not what was expected: 1 int64");
-  EXPECT_EQ(with_root([](hdf5::Group& root) {
+  EXPECT_EQ(with_root([](formats::hdf5::Group& root) {
               root.set("format", "gewebe stiffness store");
               root.set("version", std::int64_t{1});
               root.create_group("liver").set("name", "liver");
@@ -436,10 +436,12 @@ TEST(Store, EveryBeginningOfAFileIsRefused) {
     const ScratchFile file(".h5");
     write_store(file.path(), small_model(), {1}, false, 1, compressed);
     const Bytes whole = bytes_of(file.path());
-    EXPECT_NO_THROW(contents(StiffnessStore(whole, "whole")));
+    EXPECT_NO_THROW(contents(formats::StiffnessStore(whole, "whole")));
     for (std::size_t size = 0; size < whole.size(); size += size < 128 ? 1 : 97)
-      EXPECT_THROW(contents(StiffnessStore(std::span(whole.data(), size), "cut")), Error) << size;
-    EXPECT_THROW(contents(StiffnessStore(std::span(whole.data(), whole.size() - 1), "cut")), Error);
+      EXPECT_THROW(contents(formats::StiffnessStore(std::span(whole.data(), size), "cut")), Error)
+          << size;
+    EXPECT_THROW(
+        contents(formats::StiffnessStore(std::span(whole.data(), whole.size() - 1), "cut")), Error);
   }
 }
 
@@ -448,14 +450,14 @@ TEST(Store, EveryFlippedBitIsFoundOrHarmless) {
     const ScratchFile file(".h5");
     write_store(file.path(), small_model(), {1}, false, 1, compressed);
     Bytes bytes = bytes_of(file.path());
-    const std::vector<double> expected = contents(StiffnessStore(bytes, "whole"));
+    const std::vector<double> expected = contents(formats::StiffnessStore(bytes, "whole"));
     std::size_t refused = 0, tried = 0;
     for (std::size_t i = 0; i < bytes.size(); i += 7) {
       const auto bit = static_cast<std::uint8_t>(1U << (i % 8));
       bytes[i] ^= bit;
       ++tried;
       try {
-        EXPECT_EQ(contents(StiffnessStore(bytes, "flipped")), expected) << i;
+        EXPECT_EQ(contents(formats::StiffnessStore(bytes, "flipped")), expected) << i;
       } catch (const Error&) {
         ++refused;
       }
@@ -463,47 +465,53 @@ TEST(Store, EveryFlippedBitIsFoundOrHarmless) {
     }
     // The rest lies between the arrays and in the bounds, which are not read here.
     EXPECT_GT(refused, tried * 3 / 4);
-    EXPECT_EQ(contents(StiffnessStore(bytes, "whole")), expected);
+    EXPECT_EQ(contents(formats::StiffnessStore(bytes, "whole")), expected);
   }
 }
 
 TEST(Store, ArraysOfOtherSizesAreRefused) {
-  const Model model = small_model();
-  const StiffnessMatrix k = stiffness_matrix(model);
+  const model::Model model = small_model();
+  const linalg::StiffnessMatrix k = fem::stiffness_matrix(model);
   const ScratchFile file(".h5");
   const auto write = [&](auto&& spoil) {
-    StiffnessFacts facts;
+    formats::StiffnessFacts facts;
     facts.object = "x";
-    facts.hash = stiffness_hash(model);
+    facts.hash = formats::stiffness_hash(model);
     facts.nodes = model.nodes.size();
     facts.order = k.order();
     facts.norm = facts.condition = 1;
     spoil(facts);
-    const Factor factor(k, {});
-    Output output(file.path(), {});
-    StiffnessStoreWriter writer(output);
+    const linalg::Factor factor(k, {});
+    formats::Output output(file.path(), {});
+    formats::StiffnessStoreWriter writer(output);
     writer.begin(facts, k, factor, {});
     writer.end(0);
     writer.close();
     output.commit();
     return refusal(file.path());
   };
-  EXPECT_EQ(write([](StiffnessFacts&) {}), "accepted");
-  EXPECT_NE(write([](StiffnessFacts& f) { ++f.order; }).find("has shape"), std::string::npos);
-  EXPECT_NE(write([](StiffnessFacts& f) { f.order = 0; }).find("its order"), std::string::npos);
-  EXPECT_NE(write([](StiffnessFacts& f) { f.nodes = 3; }).find("its order"), std::string::npos);
-  EXPECT_NE(write([](StiffnessFacts& f) { f.nodes = 4; }).find("its axes"), std::string::npos);
-  EXPECT_NE(write([](StiffnessFacts& f) { f.nodes = UINT64_MAX; }).find("its number of nodes"),
+  EXPECT_EQ(write([](formats::StiffnessFacts&) {}), "accepted");
+  EXPECT_NE(write([](formats::StiffnessFacts& f) { ++f.order; }).find("has shape"),
             std::string::npos);
-  EXPECT_NE(write([](StiffnessFacts& f) { f.norm = NAN; }).find("its norm"), std::string::npos);
-  EXPECT_NE(write([](StiffnessFacts& f) { f.condition = -1; }).find("its condition"),
+  EXPECT_NE(write([](formats::StiffnessFacts& f) { f.order = 0; }).find("its order"),
+            std::string::npos);
+  EXPECT_NE(write([](formats::StiffnessFacts& f) { f.nodes = 3; }).find("its order"),
+            std::string::npos);
+  EXPECT_NE(write([](formats::StiffnessFacts& f) { f.nodes = 4; }).find("its axes"),
+            std::string::npos);
+  EXPECT_NE(
+      write([](formats::StiffnessFacts& f) { f.nodes = UINT64_MAX; }).find("its number of nodes"),
+      std::string::npos);
+  EXPECT_NE(write([](formats::StiffnessFacts& f) { f.norm = NAN; }).find("its norm"),
+            std::string::npos);
+  EXPECT_NE(write([](formats::StiffnessFacts& f) { f.condition = -1; }).find("its condition"),
             std::string::npos);
 }
 
 TEST(Store, LeavesNoFileWhereAColumnDoesNotFit) {
   // Displacements beyond float32: a model so soft that 1 / k exceeds 3e38.
-  Model model = small_model();
-  for (Spring& s : model.springs)
+  model::Model model = small_model();
+  for (model::Spring& s : model.springs)
     s.stiffness *= 1e-60;
   const ScratchFile file(".h5");
   (void)std::remove(file.path().c_str());
@@ -516,38 +524,40 @@ TEST(Hdf5, KeepsTextsNumbersAndGrowingArrays) {
   const std::vector<float> frame{1, 2, 3, 4, 5, 6};
   const std::vector<std::int64_t> list{4, -5};
   {
-    hdf5::File made = hdf5::File::create(file.path());
-    hdf5::Group group = made.root().create_group(hdf5::link_name("a/b"));
+    formats::hdf5::File made = formats::hdf5::File::create(file.path());
+    formats::hdf5::Group group = made.root().create_group(formats::hdf5::link_name("a/b"));
     group.set("empty", "");
     group.set("text", "Leber, außen");
     group.set("list", std::span<const std::int64_t>(list));
     group.write_texts("names", {"one", "", "three"});
-    hdf5::Dataset grown = group.create_growing("frames", hdf5::Number::float32, {2, 3});
+    formats::hdf5::Dataset grown =
+        group.create_growing("frames", formats::hdf5::Number::float32, {2, 3});
     for (int i = 0; i < 5; ++i)
       grown.append(std::span<const float>(frame));
     EXPECT_THROW(grown.append(std::span<const float>(frame.data(), 5)), Error);
-    hdf5::Dataset place = group.create_dataset("place", hdf5::Number::float32, {3, 2, 3});
+    formats::hdf5::Dataset place =
+        group.create_dataset("place", formats::hdf5::Number::float32, {3, 2, 3});
     place.write_rows(1, std::span<const float>(frame));
     EXPECT_THROW(place.write_rows(3, std::span<const float>(frame)), Error);
     made.close();
   }
-  const hdf5::File read = hdf5::File::open(file.path());
+  const formats::hdf5::File read = formats::hdf5::File::open(file.path());
   EXPECT_EQ(read.root().groups(), std::vector<std::string>{"a_b"});
-  const hdf5::Group group = read.root().group("a_b");
+  const formats::hdf5::Group group = read.root().group("a_b");
   EXPECT_EQ(group.text("empty"), "");
   EXPECT_EQ(group.text("text"), "Leber, außen");
   EXPECT_EQ(group.numbers<std::int64_t>("list", 2), list);
   EXPECT_THROW((void)group.numbers<std::int64_t>("list", 3), Error);
   EXPECT_THROW((void)group.numbers<double>("list", 2), Error);
   EXPECT_EQ(group.read_texts("names"), (std::vector<std::string>{"one", "", "three"}));
-  const hdf5::Dataset grown = group.dataset("frames", hdf5::Number::float32);
-  EXPECT_EQ(grown.shape(), (hdf5::Shape{5, 2, 3}));
+  const formats::hdf5::Dataset grown = group.dataset("frames", formats::hdf5::Number::float32);
+  EXPECT_EQ(grown.shape(), (formats::hdf5::Shape{5, 2, 3}));
   std::vector<float> back(6);
   grown.read_rows(4, std::span<float>(back));
   EXPECT_EQ(back, frame);
-  group.dataset("place", hdf5::Number::float32).read_rows(0, std::span<float>(back));
+  group.dataset("place", formats::hdf5::Number::float32).read_rows(0, std::span<float>(back));
   EXPECT_EQ(back, std::vector<float>(6));
   EXPECT_FALSE(group.has("none"));
   EXPECT_FALSE(group.has("../a_b"));
-  EXPECT_THROW((void)group.dataset("frames", hdf5::Number::float64), Error);
+  EXPECT_THROW((void)group.dataset("frames", formats::hdf5::Number::float64), Error);
 }

@@ -22,24 +22,25 @@
 #include <utility>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::test {
 namespace {
 
 constexpr double young = 3e4;
 
-Model quadratic(TetMesh mesh, double poisson, const HyperelasticLaw& law) {
+model::Model quadratic(tetrahedra::TetMesh mesh, double poisson,
+                       const model::HyperelasticLaw& law) {
   for (Tetrahedron& t : mesh.tetrahedra)
-    if (!(tetrahedron_volume(mesh.points[t[0]], mesh.points[t[1]], mesh.points[t[2]],
-                             mesh.points[t[3]]) > 0))
+    if (!(tetrahedra::tetrahedron_volume(mesh.points[t[0]], mesh.points[t[1]], mesh.points[t[2]],
+                                         mesh.points[t[3]]) > 0))
       std::swap(t[2], t[3]);
-  SolidModelOptions options;
+  fem::SolidModelOptions options;
   options.material.materials = {{"gel", 1e-3, young, 1, 0.2, poisson, law}};
   options.quadratic = true;
-  return solid_model(std::move(mesh), options, {});
+  return fem::solid_model(std::move(mesh), options, {});
 }
 
 template <class Is>
-std::vector<std::uint32_t> where(const Model& model, const Is& is) {
+std::vector<std::uint32_t> where(const model::Model& model, const Is& is) {
   std::vector<std::uint32_t> nodes;
   for (std::uint32_t i = 0; i < model.nodes.size(); ++i)
     if (is(model.nodes[i].position))
@@ -48,8 +49,8 @@ std::vector<std::uint32_t> where(const Model& model, const Is& is) {
 }
 
 /// An octant of a thick sphere: cells between directions (1, s, t) in each order of axes.
-TetMesh octant(double inner, double outer, int cells, int layers) {
-  TetMesh mesh;
+tetrahedra::TetMesh octant(double inner, double outer, int cells, int layers) {
+  tetrahedra::TetMesh mesh;
   std::map<std::array<int, 4>, std::uint32_t> known;
   const auto point = [&](const std::array<int, 3>& direction, int layer) {
     const auto [entry, is_new] =
@@ -95,10 +96,10 @@ double biaxial_slope(double stretch, double c20) {
 
 TEST(StrainedShapes, AThickSphereIsBlownUpToTwiceItsRadius) {
   const double inner = 10, outer = 20, c20 = 0.1, poisson = 0.4995;
-  const Model octants = [&] {
-    HyperelasticLaw law{HyperelasticLaw::yeoh, {c20, 0, 0}};
-    Model model = quadratic(octant(inner, outer, 4, 3), poisson, law);
-    for (Node& node : model.nodes)
+  const model::Model octants = [&] {
+    model::HyperelasticLaw law{model::HyperelasticLaw::yeoh, {c20, 0, 0}};
+    model::Model model = quadratic(octant(inner, outer, 4, 3), poisson, law);
+    for (model::Node& node : model.nodes)
       for (int axis = 0; axis < 3; ++axis)
         if (std::abs(node.position[axis]) < 1e-9)
           node.fixed = static_cast<std::uint8_t>(node.fixed | 1 << axis);
@@ -114,11 +115,11 @@ TEST(StrainedShapes, AThickSphereIsBlownUpToTwiceItsRadius) {
     pressure += (a - b) / parts * biaxial_slope(s, c20) / (s * s * s - 1);
   }
   pressure *= young / 2 / (1 + poisson);
-  Load load;
+  contact::Load load;
   const auto wall = where(octants, [&](const Vec3& p) { return norm(p) < 1.05 * inner; });
   for (const std::uint32_t node : wall)
     load.pressure[node] = {-pressure};
-  SolidStatic body(octants, SolidLaw::hyperelastic, test::one_thread());
+  dynamics::SolidStatic body(octants, integrator::SolidLaw::hyperelastic, test::one_thread());
   ASSERT_NO_THROW(body.update(load));
   double radius = 0, corners = 0;
   for (const std::uint32_t node : wall)
@@ -132,8 +133,9 @@ TEST(StrainedShapes, AThickSphereIsBlownUpToTwiceItsRadius) {
 }
 
 /// A cylinder along z whose cross-sections are squares drawn to a circle.
-TetMesh cylinder(double radius, double length, std::uint32_t cells, std::uint32_t layers) {
-  TetMesh mesh = test::box_tetrahedra(cells, cells, layers);
+tetrahedra::TetMesh cylinder(double radius, double length, std::uint32_t cells,
+                             std::uint32_t layers) {
+  tetrahedra::TetMesh mesh = test::box_tetrahedra(cells, cells, layers);
   for (Vec3& p : mesh.points) {
     const double x = 2 * p.x / cells - 1, y = 2 * p.y / cells - 1;
     p = {radius * x * std::sqrt(1 - y * y / 2), radius * y * std::sqrt(1 - x * x / 2),
@@ -143,7 +145,7 @@ TetMesh cylinder(double radius, double length, std::uint32_t cells, std::uint32_
 }
 
 /// Integral of x² + y² over the body, per length.
-double polar_moment(const Model& model, double length) {
+double polar_moment(const model::Model& model, double length) {
   double sum = 0;
   for (const Tetrahedron& t : model.tetrahedra) {
     double squares = 0, x = 0, y = 0;
@@ -153,8 +155,8 @@ double polar_moment(const Model& model, double length) {
       x += p.x;
       y += p.y;
     }
-    sum += tetrahedron_volume(model.nodes[t[0]].position, model.nodes[t[1]].position,
-                              model.nodes[t[2]].position, model.nodes[t[3]].position) /
+    sum += tetrahedra::tetrahedron_volume(model.nodes[t[0]].position, model.nodes[t[1]].position,
+                                          model.nodes[t[2]].position, model.nodes[t[3]].position) /
            20 * (squares + x * x + y * y);
   }
   return sum / length;
@@ -165,15 +167,16 @@ TEST(StrainedShapes, ATwistedCylinderHasRivlinsTorqueAndIsPressed) {
   // an incompressible Neo-Hookean cylinder are turned and stay in their planes (Rivlin, Phil.
   // Trans. A 241, 1948).
   const double length = 30, poisson = 0.4995;
-  Model model = quadratic(cylinder(10, length, 4, 6), poisson, {HyperelasticLaw::yeoh, {}});
+  model::Model model =
+      quadratic(cylinder(10, length, 4, 6), poisson, {model::HyperelasticLaw::yeoh, {}});
   const auto lower = where(model, [](const Vec3& p) { return p.z < 1e-9; });
   for (const std::uint32_t node : lower)
-    model.nodes[node].fixed = fixed_all;
+    model.nodes[node].fixed = model::fixed_all;
   const auto upper = where(model, [&](const Vec3& p) { return p.z > length - 1e-9; });
   const double mu = young / 2 / (1 + poisson), moment = polar_moment(model, length);
-  SolidStatic body(model, SolidLaw::hyperelastic, test::one_thread());
+  dynamics::SolidStatic body(model, integrator::SolidLaw::hyperelastic, test::one_thread());
   const double angle = std::numbers::pi / 3;
-  Load load;
+  contact::Load load;
   for (const std::uint32_t node : upper) {
     const Vec3& p = model.nodes[node].position;
     load.displacement[node] = {std::cos(angle) * p.x - std::sin(angle) * p.y - p.x,
@@ -181,7 +184,7 @@ TEST(StrainedShapes, ATwistedCylinderHasRivlinsTorqueAndIsPressed) {
   }
   ASSERT_NO_THROW(body.update(load));
   double torque = 0, force = 0;
-  for (const NodeVector& f : body.holding_forces()) {
+  for (const contact::NodeVector& f : body.holding_forces()) {
     const Vec3 at = model.nodes[f.node].position + vector_at(body.displacement(), f.node);
     torque += at.x * f.value.y - at.y * f.value.x;
     force += f.value.z;
@@ -194,16 +197,16 @@ TEST(StrainedShapes, ATwistedCylinderHasRivlinsTorqueAndIsPressed) {
 TEST(StrainedShapes, AColumnBucklesAtEulersLoadAndBendsAsTheElasticaBeyond) {
   // Thicker along z, so that it buckles along y alone.
   const double length = 100, side = 10, width = 15, poisson = 0.3;
-  Model model = quadratic(test::box_tetrahedra(20, 2, 3, side / 2), poisson, {});
-  for (Node& node : model.nodes)
+  model::Model model = quadratic(test::box_tetrahedra(20, 2, 3, side / 2), poisson, {});
+  for (model::Node& node : model.nodes)
     if (node.position.x < 1e-9)
-      node.fixed = fixed_all;
+      node.fixed = model::fixed_all;
   const auto end = where(model, [&](const Vec3& p) { return p.x > length - 1e-9; });
   const double euler = std::numbers::pi * std::numbers::pi * young * width * side * side * side /
                        12 / (4 * length * length);
-  SolidStatic body(model, SolidLaw::hyperelastic, test::one_thread());
+  dynamics::SolidStatic body(model, integrator::SolidLaw::hyperelastic, test::one_thread());
   const auto mean = [&](double along, double across) {
-    Load load;
+    contact::Load load;
     for (const std::uint32_t node : end)
       load.force[node] = Vec3{-along, across, 0} / static_cast<double>(end.size());
     body.update(load);
@@ -227,13 +230,13 @@ TEST(StrainedShapes, AColumnBucklesAtEulersLoadAndBendsAsTheElasticaBeyond) {
 TEST(StrainedShapes, AHeavyBarIsFoundAtOnceHoweverNearPoissonsRatioIsToOneHalf) {
   std::vector<double> before;
   for (const double poisson : {0.49, 0.499, 0.4999}) {
-    Model model = quadratic(test::box_tetrahedra(8, 2, 2, 10), poisson, {});
-    for (Node& node : model.nodes)
+    model::Model model = quadratic(test::box_tetrahedra(8, 2, 2, 10), poisson, {});
+    for (model::Node& node : model.nodes)
       if (node.position.x < 1e-9)
-        node.fixed = fixed_all;
-    Load load;
+        node.fixed = model::fixed_all;
+    contact::Load load;
     load.gravity = {0, 0, -9810};
-    SolidStatic body(model, SolidLaw::hyperelastic, test::one_thread());
+    dynamics::SolidStatic body(model, integrator::SolidLaw::hyperelastic, test::one_thread());
     ASSERT_NO_THROW(body.update(load));
     EXPECT_LE(body.counts().factors, 16) << poisson;
     const std::vector<double> u(body.displacement().begin(), body.displacement().end());
@@ -249,4 +252,4 @@ TEST(StrainedShapes, AHeavyBarIsFoundAtOnceHoweverNearPoissonsRatioIsToOneHalf) 
 }
 
 } // namespace
-} // namespace gewebe
+} // namespace gewebe::test

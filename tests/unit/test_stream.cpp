@@ -61,16 +61,16 @@ TEST(Stream, ManyBytesComeWhole) {
   ASSERT_EQ(::mkfifo((folder / "fifo").c_str(), 0600), 0);
   std::thread writer([&] { put(folder / "fifo", text); });
   {
-    Input fifo(folder / "fifo");
+    formats::Input fifo(folder / "fifo");
     EXPECT_EQ(fifo.peek(3), text.substr(0, 3));
     EXPECT_TRUE(fifo.read_all_pages().view() == text);
   }
   writer.join();
-  EXPECT_TRUE(Input(folder / "file").read_all_pages().view() == text);
-  EXPECT_TRUE(Input(folder / "file").read_all_pages(text.size()).view() == text);
-  EXPECT_THROW((void)Input(folder / "file").read_all_pages(text.size() - 1), Error);
+  EXPECT_TRUE(formats::Input(folder / "file").read_all_pages().view() == text);
+  EXPECT_TRUE(formats::Input(folder / "file").read_all_pages(text.size()).view() == text);
+  EXPECT_THROW((void)formats::Input(folder / "file").read_all_pages(text.size() - 1), Error);
   put(folder / "empty", "");
-  EXPECT_THROW((void)Input(folder / "empty").read_all_pages(), Error);
+  EXPECT_THROW((void)formats::Input(folder / "empty").read_all_pages(), Error);
 }
 
 TEST(Stream, OutputAppearsWholeOrNotAtAll) {
@@ -78,14 +78,14 @@ TEST(Stream, OutputAppearsWholeOrNotAtAll) {
   const std::string path = folder / "a";
   put(path, "old");
   {
-    Output output(path, {});
+    formats::Output output(path, {});
     output.write("new");
     EXPECT_EQ(content(path), "old");
     EXPECT_EQ(folder.count(), 2U); // the temporary file beside it
   }
   EXPECT_EQ(content(path), "old"); // no commit, no change
   EXPECT_EQ(folder.count(), 1U);
-  Output output(path, {});
+  formats::Output output(path, {});
   output.write("new");
   output.commit();
   EXPECT_EQ(content(path), "new");
@@ -100,12 +100,12 @@ TEST(Stream, ModeIsTheOldOneOrTheMask) {
     return info.st_mode & 0777U;
   };
   const mode_t mask = ::umask(027);
-  Output fresh(folder / "fresh", {});
+  formats::Output fresh(folder / "fresh", {});
   fresh.commit();
   EXPECT_EQ(mode(folder / "fresh"), 0640U);
   put(folder / "old", "x");
   ASSERT_EQ(::chmod((folder / "old").c_str(), 0604), 0);
-  Output again(folder / "old", {});
+  formats::Output again(folder / "old", {});
   again.commit();
   EXPECT_EQ(mode(folder / "old"), 0604U);
   (void)::umask(mask);
@@ -115,7 +115,7 @@ TEST(Stream, SymlinkStaysAndItsTargetIsWritten) {
   const ScratchFolder folder;
   fs::create_directory(folder / "d");
   fs::create_symlink("d/target", folder / "link");
-  Output output(folder / "link", {});
+  formats::Output output(folder / "link", {});
   output.write("x");
   output.commit();
   EXPECT_TRUE(fs::is_symlink(folder / "link"));
@@ -129,7 +129,7 @@ TEST(Stream, KeepUnchangedLeavesTheTimeStamp) {
   const auto old_time = fs::file_time_type::clock::now() - std::chrono::hours(1);
   fs::last_write_time(path, old_time);
   const auto write = [&](const char* text) {
-    Output output(path, {.keep_unchanged = true});
+    formats::Output output(path, {.keep_unchanged = true});
     output.write(text);
     output.commit();
   };
@@ -147,8 +147,8 @@ TEST(Stream, FifoIsWrittenDirectly) {
   const std::string path = folder / "fifo";
   ASSERT_EQ(::mkfifo(path.c_str(), 0600), 0);
   std::string got;
-  std::thread reader([&] { got = Input(path).read_all(); });
-  Output output(path, {});
+  std::thread reader([&] { got = formats::Input(path).read_all(); });
+  formats::Output output(path, {});
   output.stream() << "through";
   output.commit();
   reader.join();
@@ -158,14 +158,14 @@ TEST(Stream, FifoIsWrittenDirectly) {
 
 TEST(Stream, FailuresNameTheFile) {
   const ScratchFolder folder;
-  EXPECT_THROW(Input(folder / "none"), Error);
-  EXPECT_THROW(Input(folder / ""), Error); // a directory
-  EXPECT_THROW(Output(folder / "", {}), Error);
-  EXPECT_THROW(Output(folder / "none/a", {}), Error);
+  EXPECT_THROW(formats::Input(folder / "none"), Error);
+  EXPECT_THROW(formats::Input(folder / ""), Error); // a directory
+  EXPECT_THROW(formats::Output(folder / "", {}), Error);
+  EXPECT_THROW(formats::Output(folder / "none/a", {}), Error);
   put(folder / "empty", "");
-  Input empty(folder / "empty");
+  formats::Input empty(folder / "empty");
   EXPECT_THROW((void)empty.read_all(), Error);
-  Output full("/dev/full", {});
+  formats::Output full("/dev/full", {});
   full.write("x");
   try {
     full.commit();
@@ -182,14 +182,14 @@ TEST(Stream, PeekConsumesNothing) {
   for (int n = 0; n < 700000; ++n)
     text += std::to_string(n) + ' ';
   put(folder / "a", text);
-  Input input(folder / "a");
+  formats::Input input(folder / "a");
   EXPECT_EQ(input.peek(4), text.substr(0, 4));
   EXPECT_EQ(input.peek(4096), text.substr(0, 4096));
   EXPECT_EQ(input.read_all(), text);
-  Input again(folder / "a");
+  formats::Input again(folder / "a");
   EXPECT_EQ(again.peek(10), text.substr(0, 10));
   std::string streamed(std::istreambuf_iterator<char>(again.stream()), {});
   EXPECT_EQ(streamed, text);
-  Input limited(folder / "a");
+  formats::Input limited(folder / "a");
   EXPECT_THROW((void)limited.read_all(1000), Error);
 }

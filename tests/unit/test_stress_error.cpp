@@ -10,17 +10,17 @@
 #include <numeric>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::test {
 
 namespace {
 
-StressError error_of(const test::SolidCase& c, const std::vector<double>& u, int threads = 1) {
+fem::StressError error_of(const test::SolidCase& c, const std::vector<double>& u, int threads = 1) {
   Context context;
   context.threads = threads;
-  return stress_error(
+  return fem::stress_error(
       c.solid.mesh, c.solid.elements,
-      solid_stresses(c.solid.elements,
-                     solid_strains(c.solid.mesh, c.solid.materials, c.solid.elements, u)),
+      fem::solid_stresses(c.solid.elements,
+                          fem::solid_strains(c.solid.mesh, c.solid.materials, c.solid.elements, u)),
       context);
 }
 
@@ -30,7 +30,7 @@ double sum(const std::vector<double>& of) {
 
 double energy(const test::SolidCase& c, const std::vector<double>& u) {
   std::vector<double> force(u.size());
-  multiply_solid(c.solid.mesh, c.solid.elements, u, force);
+  fem::multiply_solid(c.solid.mesh, c.solid.elements, u, force);
   return std::inner_product(u.begin(), u.end(), force.begin(), 0.0);
 }
 
@@ -53,7 +53,7 @@ TEST(StressError, ConstantStressHasNone) {
   for (const bool quadratic : {false, true}) {
     const test::SolidCase c = test::patch(quadratic, 0.45);
     const std::vector<double> u = displacements(c);
-    const StressError error = error_of(c, u);
+    const fem::StressError error = error_of(c, u);
     EXPECT_LT(sum(error.energy), 1e-20 * energy(c, u));
     EXPECT_EQ(error.at_node.size(), c.solid.mesh.points.size());
   }
@@ -78,7 +78,7 @@ TEST(StressError, OfClampedBlocksIsWithinAFactorOfTwo) {
 
 TEST(StressError, IsLargestAtClampedEdges) {
   const test::SolidCase c = sheared_block(4, true, 0.45);
-  const StressError error = error_of(c, displacements(c));
+  const fem::StressError error = error_of(c, displacements(c));
   const auto at = static_cast<std::size_t>(
       std::max_element(error.at_node.begin(), error.at_node.end()) - error.at_node.begin());
   const Vec3& p = c.solid.mesh.points[at];
@@ -95,20 +95,20 @@ TEST(StressError, StressesJumpBetweenMaterialsWithoutError) {
       y += c.solid.mesh.points[corner].y / 4;
     c.solid.mesh.material.push_back(y > 5 ? 1 : 0);
   }
-  c.solid.elements = solid_elements(c.solid.mesh, c.solid.materials);
+  c.solid.elements = fem::solid_elements(c.solid.mesh, c.solid.materials);
   std::vector<double> u;
   for (const Vec3& p : c.solid.mesh.points)
     u.insert(u.end(), {p.x / 100, 0, 0});
-  const StressError error = error_of(c, u);
+  const fem::StressError error = error_of(c, u);
   EXPECT_LT(sum(error.energy), 1e-20 * energy(c, u));
 }
 
 TEST(StressError, SameBytesOnAnyThreads) {
   const test::SolidCase c = sheared_block(4, true, 0.45);
   const std::vector<double> u = displacements(c);
-  const StressError one = error_of(c, u, 1), two = error_of(c, u, 2);
+  const fem::StressError one = error_of(c, u, 1), two = error_of(c, u, 2);
   EXPECT_EQ(one.energy, two.energy);
   EXPECT_EQ(one.at_node, two.at_node);
 }
 
-} // namespace gewebe
+} // namespace gewebe::test

@@ -14,32 +14,32 @@
 #include <map>
 #include <random>
 
-namespace gewebe {
+namespace gewebe::test {
 namespace {
 
 /// Material 1 in a ball about a place, else 0.
-MaterialSource in_ball(const Vec3& center, double radius) {
+stuffing::MaterialSource in_ball(const Vec3& center, double radius) {
   return [=] {
     return [=](const Vec3& place) -> std::int32_t { return norm(place - center) < radius ? 1 : 0; };
   };
 }
 
-std::map<std::int32_t, double> volumes(const TetMesh& mesh) {
+std::map<std::int32_t, double> volumes(const tetrahedra::TetMesh& mesh) {
   std::map<std::int32_t, double> result;
   for (std::size_t n = 0; n < mesh.tetrahedra.size(); ++n) {
     const auto& [a, b, c, d] = mesh.tetrahedra[n];
-    result[mesh.material[n]] +=
-        tetrahedron_volume(mesh.points[a], mesh.points[b], mesh.points[c], mesh.points[d]);
+    result[mesh.material[n]] += tetrahedra::tetrahedron_volume(mesh.points[a], mesh.points[b],
+                                                               mesh.points[c], mesh.points[d]);
   }
   return result;
 }
 
 /// The triangles between two materials.
-std::vector<Triangle> interface_of(const TetMesh& mesh) {
+std::vector<Triangle> interface_of(const tetrahedra::TetMesh& mesh) {
   std::map<Triangle, std::int32_t> open;
   std::vector<Triangle> result;
   for (std::size_t n = 0; n < mesh.tetrahedra.size(); ++n)
-    for (const auto& face : tetrahedron_faces) {
+    for (const auto& face : tetrahedra::tetrahedron_faces) {
       Triangle triangle{};
       for (std::size_t c = 0; c < 3; ++c)
         triangle[c] = mesh.tetrahedra[n][face[c]];
@@ -55,16 +55,16 @@ std::vector<Triangle> interface_of(const TetMesh& mesh) {
 }
 
 TEST(StuffingInterface, ABallInABallConvergesWithTheSquareOfTheCell) {
-  const Grid grid = ball_grid(5, 0.25);
+  const volume::Grid grid = ball_grid(5, 0.25);
   const Vec3 center{0.7, -0.4, 0.3};
   std::vector<double> errors, distances;
   for (const double cell : {1.0, 0.5, 0.25}) {
-    StuffingOptions options{{}, cell};
+    stuffing::StuffingOptions options{{}, cell};
     const std::vector<Triangle> outer = boundary_triangles(stuffed(grid, options));
     options.materials = in_ball(center, 2);
     options.follow_interface = true;
-    StuffingReport report;
-    const TetMesh mesh = stuffed(grid, options, 1, &report);
+    stuffing::StuffingReport report;
+    const tetrahedra::TetMesh mesh = stuffed(grid, options, 1, &report);
     EXPECT_EQ(boundary_triangles(mesh), outer);
     EXPECT_GT(report.interface_cuts, 0U);
     EXPECT_GT(report.interface_warped, 0U);
@@ -84,10 +84,10 @@ TEST(StuffingInterface, ABallInABallConvergesWithTheSquareOfTheCell) {
 }
 
 TEST(StuffingInterface, AStaircaseHasTheMaterialOfTheCentroid) {
-  StuffingOptions options{{}, 0.5};
-  const TetMesh bare = stuffed(ball_grid(5, 0.25), options);
+  stuffing::StuffingOptions options{{}, 0.5};
+  const tetrahedra::TetMesh bare = stuffed(ball_grid(5, 0.25), options);
   options.materials = in_ball({0, 0, 0}, 3);
-  const TetMesh mesh = stuffed(ball_grid(5, 0.25), options);
+  const tetrahedra::TetMesh mesh = stuffed(ball_grid(5, 0.25), options);
   EXPECT_EQ(mesh.points, bare.points);
   EXPECT_EQ(mesh.tetrahedra, bare.tetrahedra);
   for (std::size_t n = 0; n < mesh.tetrahedra.size(); ++n) {
@@ -96,22 +96,23 @@ TEST(StuffingInterface, AStaircaseHasTheMaterialOfTheCentroid) {
     ASSERT_EQ(mesh.material[n], norm(centroid) < 3 ? 1 : 0);
   }
   options.grade = 3;
-  const TetMesh graded = stuffed(ball_grid(5, 0.25), options);
+  const tetrahedra::TetMesh graded = stuffed(ball_grid(5, 0.25), options);
   EXPECT_EQ(interface_of(graded).size(), interface_of(mesh).size());
 }
 
 TEST(StuffingInterface, WhatCrossesTheBoundaryHasNoGap) {
-  const Grid grid = ball_grid(5, 0.25);
+  const volume::Grid grid = ball_grid(5, 0.25);
   const Vec3 center{4, 1, 0};
   for (const unsigned grade : {0U, 2U}) {
-    StuffingOptions options{{}, 0.4, grade};
-    const TetMesh bare = stuffed(grid, options);
+    stuffing::StuffingOptions options{{}, 0.4, grade};
+    const tetrahedra::TetMesh bare = stuffed(grid, options);
     options.materials = in_ball(center, 3);
     options.follow_interface = true;
-    StuffingReport report;
-    const TetMesh mesh = stuffed(grid, options, 2, &report);
+    stuffing::StuffingReport report;
+    const tetrahedra::TetMesh mesh = stuffed(grid, options, 2, &report);
     EXPECT_EQ(boundary_triangles(mesh), boundary_triangles(bare));
-    EXPECT_NEAR(volume(mesh), volume(bare), 1e-11 * volume(bare));
+    EXPECT_NEAR(tetrahedra::volume(mesh), tetrahedra::volume(bare),
+                1e-11 * tetrahedra::volume(bare));
     EXPECT_GT(report.interface_kept, 0U);
     // Both balls' lens: pi (R + r - d)^2 (d^2 + 2 d (r + R) - 3 (r - R)^2) / (12 d).
     const double d = norm(center - Vec3{0.13, -0.21, 0.07});
@@ -125,14 +126,14 @@ TEST(StuffingInterface, AnyMaterialsKeepTheBounds) {
   std::uint64_t cuts = 0, warped = 0, kept = 0;
   for (std::uint32_t seed = 0; seed < 12; ++seed) {
     std::mt19937 random(seed);
-    const GridInfo info = turned_axes(seed);
-    const Grid grid = sample(info, {-8, 0, 0}, {7, 7, 9}, [&](int i, int j, int k) {
+    const volume::GridInfo info = turned_axes(seed);
+    const volume::Grid grid = sample(info, {-8, 0, 0}, {7, 7, 9}, [&](int i, int j, int k) {
       return 0.7 + 0.5 * std::sin(i * 0.5 + seed) * std::cos(j * 0.6) * std::sin(k * 0.4 + 1);
     });
     const std::int32_t count = 2 + static_cast<std::int32_t>(seed % 3);
     const double width = 0.5 + 0.37 * static_cast<double>(seed >> 2);
-    StuffingOptions options{{}, 0.6, seed % 2};
-    const TetMesh bare = stuffed(grid, options);
+    stuffing::StuffingOptions options{{}, 0.6, seed % 2};
+    const tetrahedra::TetMesh bare = stuffed(grid, options);
     options.materials = [=] {
       return [=](const Vec3& place) -> std::int32_t {
         std::uint32_t hash = seed;
@@ -143,13 +144,15 @@ TEST(StuffingInterface, AnyMaterialsKeepTheBounds) {
       };
     };
     options.follow_interface = true;
-    StuffingReport report;
-    const TetMesh mesh = stuffed(grid, options, 1, &report), two = stuffed(grid, options, 2);
+    stuffing::StuffingReport report;
+    const tetrahedra::TetMesh mesh = stuffed(grid, options, 1, &report),
+                              two = stuffed(grid, options, 2);
     EXPECT_EQ(mesh.points, two.points);
     EXPECT_EQ(mesh.tetrahedra, two.tetrahedra);
     EXPECT_EQ(mesh.material, two.material);
     EXPECT_EQ(boundary_triangles(mesh), boundary_triangles(bare));
-    EXPECT_NEAR(volume(mesh), volume(bare), 1e-10 * volume(bare));
+    EXPECT_NEAR(tetrahedra::volume(mesh), tetrahedra::volume(bare),
+                1e-10 * tetrahedra::volume(bare));
     cuts += report.interface_cuts;
     warped += report.interface_warped;
     kept += report.interface_kept;
@@ -164,24 +167,25 @@ TEST(StuffingInterface, AnyMaterialsKeepTheBounds) {
 TEST(StuffingInterface, EachTetrahedronKeepsAnUnmovedCorner) {
   std::size_t refused = 0, beside_both = 0;
   for (const double depth : {0.2, 0.5, 0.8, 1.1}) {
-    const Grid grid = ball_grid(3, 0.25);
-    const MaterialSource source = in_ball({0.2, -0.2, 0.1}, 3 - 0.6 * depth);
-    const StuffingLattice lattice = stuffing_lattice(grid, {}, 0.6);
-    StuffingBlocks blocks = stuffing_blocks({}, grid, lattice);
-    const SurfacePoints surface = warp_lattice({}, grid, lattice, blocks);
-    const BlockMaterials materials = materials_of({}, lattice, blocks, source);
-    (void)find_interface({}, materials, blocks);
-    const MaterialInterface between =
-        follow_interface({}, lattice, blocks, surface, materials, source);
-    for (const InterfacePoint& point : between.points) {
+    const volume::Grid grid = ball_grid(3, 0.25);
+    const stuffing::MaterialSource source = in_ball({0.2, -0.2, 0.1}, 3 - 0.6 * depth);
+    const stuffing::StuffingLattice lattice = stuffing::stuffing_lattice(grid, {}, 0.6);
+    stuffing::StuffingBlocks blocks = stuffing::stuffing_blocks({}, grid, lattice);
+    const stuffing::SurfacePoints surface = stuffing::warp_lattice({}, grid, lattice, blocks);
+    const stuffing::BlockMaterials materials = stuffing::materials_of({}, lattice, blocks, source);
+    (void)stuffing::find_interface({}, materials, blocks);
+    const stuffing::MaterialInterface between =
+        stuffing::follow_interface({}, lattice, blocks, surface, materials, source);
+    for (const stuffing::InterfacePoint& point : between.points) {
       refused += point.refused ? 1 : 0;
       if (!point.warped())
         continue;
-      std::array<bool, bcc::directions> moved{};
+      std::array<bool, stuffing::bcc::directions> moved{};
       bool beside_boundary = false;
-      for (unsigned d = 0; d < bcc::directions; ++d) {
-        const PlaceInBlock at = neighbour(blocks[point.block], point.word, point.bit, d);
-        const StuffingBlock& there = blocks[at.block];
+      for (unsigned d = 0; d < stuffing::bcc::directions; ++d) {
+        const stuffing::PlaceInBlock at =
+            stuffing::neighbour(blocks[point.block], point.word, point.bit, d);
+        const stuffing::StuffingBlock& there = blocks[at.block];
         const bool onto_boundary = there.surface.contains(at.word, at.bit) &&
                                    surface.points[there.surface_point(at.word, at.bit)].warped();
         moved[d] =
@@ -190,7 +194,7 @@ TEST(StuffingInterface, EachTetrahedronKeepsAnUnmovedCorner) {
         beside_boundary = beside_boundary || onto_boundary;
       }
       beside_both += beside_boundary ? 1 : 0;
-      for (const auto& [a, b, c] : bcc::link.faces)
+      for (const auto& [a, b, c] : stuffing::bcc::link.faces)
         EXPECT_FALSE(moved[a] && moved[b] && moved[c]) << depth;
     }
   }
@@ -199,4 +203,4 @@ TEST(StuffingInterface, EachTetrahedronKeepsAnUnmovedCorner) {
 }
 
 } // namespace
-} // namespace gewebe
+} // namespace gewebe::test

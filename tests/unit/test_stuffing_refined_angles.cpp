@@ -19,7 +19,7 @@
 #include <cmath>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::test {
 namespace {
 
 using angle_bounds::angles_are_within;
@@ -28,17 +28,17 @@ using angle_bounds::Range;
 struct Corner {
   Int3 place; ///< in quarters of the larger cell
   bool centre = false;
-  std::vector<Background::Node> kinds; ///< as which it may occur
+  std::vector<stuffing::Background::Node> kinds; ///< as which it may occur
 };
 using Shape = std::array<Corner, 4>;
 
 /// In quarters of a cell of level 1 (halves of finest cells).
 std::vector<Shape> shapes() {
   const auto node = [](unsigned level, bool centre, bool even) {
-    return Background::Node{{}, static_cast<std::uint8_t>(level), centre, even};
+    return stuffing::Background::Node{{}, static_cast<std::uint8_t>(level), centre, even};
   };
-  const std::vector<Background::Node> centre{node(1, true, false)}, small{node(0, false, false)},
-      any_centre{node(1, true, true), node(1, true, false)},
+  const std::vector<stuffing::Background::Node> centre{node(1, true, false)},
+      small{node(0, false, false)}, any_centre{node(1, true, true), node(1, true, false)},
       any{node(1, false, true), node(1, false, false), node(0, false, false)},
       mixed{node(1, false, false)};
   const Int3 middle{2, 2, 2}, next{6, 2, 2};
@@ -79,9 +79,9 @@ Int3 minus(const Int3& a, const Int3& b) {
   return {a[0] - b[0], a[1] - b[1], a[2] - b[2]};
 }
 double reach(const Corner& corner, const Int3& step, bool longest) {
-  double result = least_cut(corner.kinds[0], step);
-  for (const Background::Node& kind : corner.kinds) {
-    const double here = least_cut(kind, step);
+  double result = stuffing::least_cut(corner.kinds[0], step);
+  for (const stuffing::Background::Node& kind : corner.kinds) {
+    const double here = stuffing::least_cut(kind, step);
     result = longest ? test::larger(result, here) : test::smaller(result, here);
   }
   return result;
@@ -98,7 +98,7 @@ struct Proof {
   std::array<int, 4> signs;
   double lowest, highest;
 
-  Range range_of(const StencilNode& node, const std::array<Int3, 4>& warps) const {
+  Range range_of(const stuffing::StencilNode& node, const std::array<Int3, 4>& warps) const {
     const Corner& corner = shape[node.inner()];
     const Vec3 from = vec(corner.place);
     if (node.is_cut()) {
@@ -125,7 +125,7 @@ struct Proof {
   }
 
   /// \param first  direction of the first warped corner, so that this is a share of the work
-  bool holds(const std::vector<const Stencil*>& cuts, std::size_t first) const {
+  bool holds(const std::vector<const stuffing::Stencil*>& cuts, std::size_t first) const {
     static const std::vector<Int3> all = directions();
     std::size_t zeros = 0, ways = 1;
     for (const int sign : signs)
@@ -142,7 +142,7 @@ struct Proof {
         }
       if (!feasible(warps))
         continue;
-      for (const Stencil* const cut : cuts)
+      for (const stuffing::Stencil* const cut : cuts)
         for (std::size_t t = 0; t < cut->count; ++t) {
           std::array<Range, 4> nodes;
           for (std::size_t k = 0; k < 4; ++k)
@@ -156,11 +156,12 @@ struct Proof {
 };
 
 /// The stencils without a choice for a tetrahedron, with every order of edges of one length.
-std::vector<const Stencil*> stencils(const Shape& shape, const std::array<int, 4>& signs) {
-  std::vector<const Stencil*> result;
+std::vector<const stuffing::Stencil*> stencils(const Shape& shape,
+                                               const std::array<int, 4>& signs) {
+  std::vector<const stuffing::Stencil*> result;
   std::array<std::uint8_t, 4> rank{0, 1, 2, 3};
   do {
-    DiagonalOrder order{};
+    stuffing::DiagonalOrder order{};
     for (std::size_t n = 0; n < 4; ++n)
       for (std::size_t p = 0; p < 4; ++p)
         for (std::size_t q = 0; q < 4; ++q) {
@@ -170,7 +171,7 @@ std::vector<const Stencil*> stencils(const Shape& shape, const std::array<int, 4
               order[n][p] +
               (dot(b, b) < dot(a, a) || (dot(b, b) == dot(a, a) && rank[q] < rank[p])));
         }
-    const Stencil* const found = &stencil(signs, order);
+    const stuffing::Stencil* const found = &stuffing::stencil(signs, order);
     if (found->count != 0 && !found->choice && std::ranges::find(result, found) == result.end())
       result.push_back(found);
   } while (std::ranges::next_permutation(rank).found);
@@ -181,7 +182,7 @@ std::vector<const Stencil*> stencils(const Shape& shape, const std::array<int, 4
 bool all_keep(double lowest, double highest) {
   struct Task {
     Proof proof;
-    std::vector<const Stencil*> cuts;
+    std::vector<const stuffing::Stencil*> cuts;
     std::size_t first;
   };
   const std::vector<Shape> all = shapes();
@@ -189,7 +190,7 @@ bool all_keep(double lowest, double highest) {
   for (const Shape& shape : all)
     for (int n = 0; n < 81; ++n) {
       const std::array<int, 4> signs{n / 27 - 1, n / 9 % 3 - 1, n / 3 % 3 - 1, n % 3 - 1};
-      std::vector<const Stencil*> cuts = stencils(shape, signs);
+      std::vector<const stuffing::Stencil*> cuts = stencils(shape, signs);
       if (cuts.empty())
         continue;
       const bool warped = std::ranges::find(signs, 0) != signs.end();
@@ -205,13 +206,15 @@ bool all_keep(double lowest, double highest) {
 }
 
 TEST(RefinedStuffingAngles, EveryStencilKeepsTheBounds) {
-  EXPECT_TRUE(all_keep(stuffing_refined_angle_min, stuffing_refined_angle_max));
+  EXPECT_TRUE(all_keep(stuffing::stuffing_refined_angle_min, stuffing::stuffing_refined_angle_max));
 }
 
 TEST(RefinedStuffingAngles, TheProofFindsWhatLeavesThem) {
-  EXPECT_FALSE(all_keep(stuffing_refined_angle_min + 0.1, stuffing_refined_angle_max));
-  EXPECT_FALSE(all_keep(stuffing_refined_angle_min, stuffing_refined_angle_max - 0.15));
+  EXPECT_FALSE(
+      all_keep(stuffing::stuffing_refined_angle_min + 0.1, stuffing::stuffing_refined_angle_max));
+  EXPECT_FALSE(
+      all_keep(stuffing::stuffing_refined_angle_min, stuffing::stuffing_refined_angle_max - 0.15));
 }
 
 } // namespace
-} // namespace gewebe
+} // namespace gewebe::test

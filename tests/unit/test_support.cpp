@@ -19,69 +19,72 @@
 #include <string>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::test {
 namespace {
 
-bool is_solid(Way way) {
-  return way == Way::solid || way == Way::warped || way == Way::strained ||
-         way == Way::solid_motion || way == Way::sprung || way == Way::viscoelastic;
+bool is_solid(scene::Way way) {
+  return way == scene::Way::solid || way == scene::Way::warped || way == scene::Way::strained ||
+         way == scene::Way::solid_motion || way == scene::Way::sprung ||
+         way == scene::Way::viscoelastic;
 }
 
 /// All that an object is which goes on this way, in these tests, but for what it consists of.
-std::vector<Way> ways_of(Way way) {
+std::vector<scene::Way> ways_of(scene::Way way) {
   switch (way) {
-  case Way::attached:
-    return {Way::explicit_motion, Way::whole, Way::attached};
-  case Way::two_step:
-    return {Way::elastostatic, Way::whole, Way::two_step};
-  case Way::two_step_stored:
-    return {Way::elastostatic, Way::whole, Way::two_step, Way::two_step_stored};
-  case Way::cut:
-    return {Way::elastostatic, Way::cut};
-  case Way::whole:
-    return {Way::elastostatic, Way::whole};
-  case Way::solid:
-    return {Way::elastostatic, Way::whole};
-  case Way::sprung:
-    return {Way::elastostatic, Way::whole, Way::sprung};
-  case Way::warped:
-    return {Way::elastostatic, Way::whole, Way::warped};
-  case Way::strained:
-    return {Way::elastostatic, Way::whole, Way::strained};
-  case Way::viscoelastic:
-    return {Way::elastostatic, Way::whole, Way::strained, Way::viscoelastic};
-  case Way::net:
-    return {Way::elastostatic, Way::whole};
-  case Way::filled:
-    return {Way::implicit_motion, Way::whole, Way::filled};
-  case Way::solid_motion:
-    return {Way::explicit_motion, Way::whole, Way::solid_motion};
+  case scene::Way::attached:
+    return {scene::Way::explicit_motion, scene::Way::whole, scene::Way::attached};
+  case scene::Way::two_step:
+    return {scene::Way::elastostatic, scene::Way::whole, scene::Way::two_step};
+  case scene::Way::two_step_stored:
+    return {scene::Way::elastostatic, scene::Way::whole, scene::Way::two_step,
+            scene::Way::two_step_stored};
+  case scene::Way::cut:
+    return {scene::Way::elastostatic, scene::Way::cut};
+  case scene::Way::whole:
+    return {scene::Way::elastostatic, scene::Way::whole};
+  case scene::Way::solid:
+    return {scene::Way::elastostatic, scene::Way::whole};
+  case scene::Way::sprung:
+    return {scene::Way::elastostatic, scene::Way::whole, scene::Way::sprung};
+  case scene::Way::warped:
+    return {scene::Way::elastostatic, scene::Way::whole, scene::Way::warped};
+  case scene::Way::strained:
+    return {scene::Way::elastostatic, scene::Way::whole, scene::Way::strained};
+  case scene::Way::viscoelastic:
+    return {scene::Way::elastostatic, scene::Way::whole, scene::Way::strained,
+            scene::Way::viscoelastic};
+  case scene::Way::net:
+    return {scene::Way::elastostatic, scene::Way::whole};
+  case scene::Way::filled:
+    return {scene::Way::implicit_motion, scene::Way::whole, scene::Way::filled};
+  case scene::Way::solid_motion:
+    return {scene::Way::explicit_motion, scene::Way::whole, scene::Way::solid_motion};
   default:
-    return {way, Way::whole};
+    return {way, scene::Way::whole};
   }
 }
 
-const Gap* expected(Way way, Feature feature) {
-  std::vector<Way> ways = ways_of(way);
-  ways.push_back(is_solid(way) ? Way::solid : Way::net);
-  for (const Gap& one : gaps)
-    for (const Way is : ways)
+const scene::Gap* expected(scene::Way way, scene::Feature feature) {
+  std::vector<scene::Way> ways = ways_of(way);
+  ways.push_back(is_solid(way) ? scene::Way::solid : scene::Way::net);
+  for (const scene::Gap& one : scene::gaps)
+    for (const scene::Way is : ways)
       if (one.way == is && one.feature == feature)
         return &one;
   return nullptr;
 }
 
-Model stiffer(Model model) {
-  for (Spring& s : model.springs)
+model::Model stiffer(model::Model model) {
+  for (model::Spring& s : model.springs)
     s.stiffness *= 3;
   return model;
 }
 
 /// Its surface filled with tetrahedra that meet in the middle.
-Model solid(Model model) {
+model::Model solid(model::Model model) {
   model.springs.clear();
   model.materials[0].poisson = 0.4;
-  const auto surface = static_cast<std::uint32_t>(surface_count(model));
+  const auto surface = static_cast<std::uint32_t>(model::surface_count(model));
   Vec3 middle;
   for (std::uint32_t i = 0; i < surface; ++i) {
     middle += model.nodes[i].position / surface;
@@ -93,7 +96,8 @@ Model solid(Model model) {
   for (const Triangle& t : model.triangles)
     model.tetrahedra.push_back({t[1], t[0], t[2], surface});
   model.tetrahedron_material.assign(model.tetrahedra.size(), 0);
-  const std::vector<double> masses = solid_masses(element_mesh(model), element_materials(model));
+  const std::vector<double> masses =
+      fem::solid_masses(fem::element_mesh(model), fem::element_materials(model));
   for (std::size_t i = 0; i < masses.size(); ++i) {
     model.nodes[i].mass = masses[i];
     model.nodes[i].drag = masses[i];
@@ -101,127 +105,131 @@ Model solid(Model model) {
   return model;
 }
 
-Model model_of(Way way) {
-  Model model = is_solid(way) ? solid(test::organ(3)) : test::organ(3);
-  if (way == Way::sprung) {
+model::Model model_of(scene::Way way) {
+  model::Model model = is_solid(way) ? solid(test::organ(3)) : test::organ(3);
+  if (way == scene::Way::sprung) {
     const auto [i, j] = std::minmax(model.triangles[0][0], model.triangles[0][1]);
-    model.springs = {{i, j, SpringKind::edge, 1, 0, 1}};
+    model.springs = {{i, j, model::SpringKind::edge, 1, 0, 1}};
   }
-  if (way == Way::viscoelastic)
+  if (way == scene::Way::viscoelastic)
     model.materials[0].prony = {{0.3, 0.01}};
   return model;
 }
 
 class Pair {
 public:
-  Pair(Way way, std::vector<std::string>& warnings)
+  Pair(scene::Way way, std::vector<std::string>& warnings)
       : model_(model_of(way)), way_(way),
         scene_(test::one_thread(), {.warn = [&](const std::string& t) { warnings.push_back(t); }}) {
-    const bool moves = way == Way::explicit_motion || way == Way::implicit_motion ||
-                       way == Way::attached || way == Way::solid_motion || way == Way::filled;
-    const Integration integration = way == Way::implicit_motion || way == Way::filled
-                                        ? Integration::implicit
-                                        : Integration::semi_implicit;
-    SolidChoice choice;
-    if (way == Way::filled)
+    const bool moves = way == scene::Way::explicit_motion || way == scene::Way::implicit_motion ||
+                       way == scene::Way::attached || way == scene::Way::solid_motion ||
+                       way == scene::Way::filled;
+    const scene::Integration integration =
+        way == scene::Way::implicit_motion || way == scene::Way::filled
+            ? scene::Integration::implicit
+            : scene::Integration::semi_implicit;
+    integrator::SolidChoice choice;
+    if (way == scene::Way::filled)
       choice.bulk = 1000;
-    if (way == Way::strained || way == Way::viscoelastic)
-      choice.law = SolidLaw::hyperelastic;
-    scene_.add_object("o", model_, moves ? Method::ela : Method::ffe, {}, integration, choice);
-    Model beside = test::organ(3);
-    for (Node& n : beside.nodes)
+    if (way == scene::Way::strained || way == scene::Way::viscoelastic)
+      choice.law = integrator::SolidLaw::hyperelastic;
+    scene_.add_object("o", model_, moves ? scene::Method::ela : scene::Method::ffe, {}, integration,
+                      choice);
+    model::Model beside = test::organ(3);
+    for (model::Node& n : beside.nodes)
       n.position.x += 100;
-    scene_.add_object("p", std::move(beside), moves ? Method::ela : Method::ffe, {},
-                      way == Way::solid_motion ? Integration::implicit : integration);
-    if (way == Way::attached)
+    scene_.add_object("p", std::move(beside), moves ? scene::Method::ela : scene::Method::ffe, {},
+                      way == scene::Way::solid_motion ? scene::Integration::implicit : integration);
+    if (way == scene::Way::attached)
       scene_.apply(tie());
-    if (way == Way::warped)
-      scene_.apply(SetWarp{0});
-    if (way == Way::two_step || way == Way::two_step_stored)
+    if (way == scene::Way::warped)
+      scene_.apply(scene::SetWarp{0});
+    if (way == scene::Way::two_step || way == scene::Way::two_step_stored)
       scene_.apply(two_step());
-    if (way == Way::cut) {
-      scene_.apply(SetForce{0, {top()}, {0, 0, 1}});
+    if (way == scene::Way::cut) {
+      scene_.apply(scene::SetForce{0, {top()}, {0, 0, 1}});
       scene_.step(0.001);
-      scene_.apply(CutObject{0, test::incision(model_)});
-      scene_.apply(Release{0, {top()}});
+      scene_.apply(scene::CutObject{0, test::incision(model_)});
+      scene_.apply(scene::Release{0, {top()}});
       scene_.step(0.001);
       scene_.take_news();
     }
   }
 
   /// Does it to the object. \return whether it had its effect
-  bool works(Feature feature) {
+  bool works(scene::Feature feature) {
     switch (feature) {
-    case Feature::force:
-      scene_.apply(SetForce{0, {top()}, {0, 0, 2000}});
+    case scene::Feature::force:
+      scene_.apply(scene::SetForce{0, {top()}, {0, 0, 2000}});
       return bends();
-    case Feature::pressure:
-      scene_.apply(SetPressure{0, {top()}, {100, 0}});
+    case scene::Feature::pressure:
+      scene_.apply(scene::SetPressure{0, {top()}, {100, 0}});
       return bends();
-    case Feature::displace:
-      scene_.apply(SetDisplacement{0, {top()}, {0, 0, 1}});
+    case scene::Feature::displace:
+      scene_.apply(scene::SetDisplacement{0, {top()}, {0, 0, 1}});
       return bends();
-    case Feature::grasp:
-      scene_.apply(SetInstrument{0, {3, {}, 0}, {{100, -50, 90}, {}}, "tongs"});
-      scene_.apply(Grasp{0, {top()}, 0});
-      scene_.apply(MoveInstrument{0, {100, -50, 91}, {}, 0});
+    case scene::Feature::grasp:
+      scene_.apply(scene::SetInstrument{0, {3, {}, 0}, {{100, -50, 90}, {}}, "tongs"});
+      scene_.apply(scene::Grasp{0, {top()}, 0});
+      scene_.apply(scene::MoveInstrument{0, {100, -50, 91}, {}, 0});
       return bends();
-    case Feature::touch:
-      scene_.apply(SetInstrument{0, {5, {}, 0}, {{100, -50, 56}, {}}, "probe"});
+    case scene::Feature::touch:
+      scene_.apply(scene::SetInstrument{0, {5, {}, 0}, {{100, -50, 56}, {}}, "probe"});
       scene_.step(0.001);
-      scene_.apply(MoveInstrument{0, {100, -50, 53}, {}, 0.02});
+      scene_.apply(scene::MoveInstrument{0, {100, -50, 53}, {}, 0.02});
       for (int k = 0; k < 20; ++k)
         scene_.step(0.001);
       return scene_.instrument(0).nodes > 0 && norm(scene_.instrument(0).force) > 0;
-    case Feature::cut:
-      scene_.apply(CutObject{0, is_solid(way_)     ? through()
-                                : way_ == Way::cut ? lower_incision()
-                                                   : test::incision(model_)});
-      return test::count(scene_, Cutting::Kind::cut) == 1;
-    case Feature::blade:
+    case scene::Feature::cut:
+      scene_.apply(scene::CutObject{0, is_solid(way_)            ? through()
+                                       : way_ == scene::Way::cut ? lower_incision()
+                                                                 : test::incision(model_)});
+      return test::count(scene_, scene::Cutting::Kind::cut) == 1;
+    case scene::Feature::blade:
       return sweep();
-    case Feature::tear:
-      scene_.apply(SetTear{0, 0.05});
-      scene_.apply(is_solid(way_) ? SetDisplacement{0, right_half(), {6, 0, 0}}
-                                  : SetDisplacement{0, {top()}, {0, 0, 6}});
+    case scene::Feature::tear:
+      scene_.apply(scene::SetTear{0, 0.05});
+      scene_.apply(is_solid(way_) ? scene::SetDisplacement{0, right_half(), {6, 0, 0}}
+                                  : scene::SetDisplacement{0, {top()}, {0, 0, 6}});
       for (int k = 0; k < 4; ++k)
         scene_.step(0.001);
-      return test::count(scene_, Cutting::Kind::cut) > 0;
-    case Feature::restore:
-      scene_.apply(Restore{0});
-      return test::count(scene_, Cutting::Kind::restored) == 1;
-    case Feature::attach:
+      return test::count(scene_, scene::Cutting::Kind::cut) > 0;
+    case scene::Feature::restore:
+      scene_.apply(scene::Restore{0});
+      return test::count(scene_, scene::Cutting::Kind::restored) == 1;
+    case scene::Feature::attach:
       scene_.apply(tie());
-      scene_.apply(SetForce{1, {top()}, {0, 0, 2000}});
+      scene_.apply(scene::SetForce{1, {top()}, {0, 0, 2000}});
       return bends();
-    case Feature::method: {
-      const Method other = scene_.object(0).method == Method::ela ? Method::ffe : Method::ela;
-      scene_.apply(SetMethod{0, other});
+    case scene::Feature::method: {
+      const scene::Method other =
+          scene_.object(0).method == scene::Method::ela ? scene::Method::ffe : scene::Method::ela;
+      scene_.apply(scene::SetMethod{0, other});
       return scene_.object(0).method == other;
     }
-    case Feature::two_step:
+    case scene::Feature::two_step:
       scene_.apply(two_step());
-      scene_.apply(SetForce{0, {top()}, {0, 0, 2000}});
+      scene_.apply(scene::SetForce{0, {top()}, {0, 0, 2000}});
       return bends();
-    case Feature::warp:
-      scene_.apply(SetWarp{0});
-      scene_.apply(SetForce{0, {top()}, {0, 0, 2000}});
+    case scene::Feature::warp:
+      scene_.apply(scene::SetWarp{0});
+      scene_.apply(scene::SetForce{0, {top()}, {0, 0, 2000}});
       return bends();
-    case Feature::contact: // a node of the other one is brought into it from above
-      scene_.apply(SetContact{0, 1, 0});
+    case scene::Feature::contact: // a node of the other one is brought into it from above
+      scene_.apply(scene::SetContact{0, 1, 0});
       for (const Vec3& at : {Vec3{0, 0, 10}, Vec3{-100, 0, 10}, Vec3{-100, 0, -1}}) {
-        scene_.apply(SetDisplacement{1, {top()}, at, 0.02});
+        scene_.apply(scene::SetDisplacement{1, {top()}, at, 0.02});
         for (int k = 0; k < 4; ++k)
           scene_.step(0.005);
       }
       return bends() && !scene_.contact_forces(0).empty();
-    case Feature::self_contact:
-      scene_.apply(SetContact{0, 0, 0});
-      scene_.apply(SetForce{0, {top()}, {0, 0, 2000}});
+    case scene::Feature::self_contact:
+      scene_.apply(scene::SetContact{0, 0, 0});
+      scene_.apply(scene::SetForce{0, {top()}, {0, 0, 2000}});
       return bends();
-    case Feature::prepare:
-      scene_.apply(Prepare{.object = 0, .contact = true, .cut = false, .nodes_ahead = {}});
-      scene_.apply(SetForce{0, {top()}, {0, 0, 2000}});
+    case scene::Feature::prepare:
+      scene_.apply(scene::Prepare{.object = 0, .contact = true, .cut = false, .nodes_ahead = {}});
+      scene_.apply(scene::SetForce{0, {top()}, {0, 0, 2000}});
       return bends();
     }
     return false;
@@ -232,25 +240,25 @@ private:
   std::vector<std::uint32_t> right_half() const {
     std::vector<std::uint32_t> nodes;
     for (std::uint32_t i = 0; i < model_.nodes.size(); ++i)
-      if (model_.nodes[i].position.x > 101 && model_.nodes[i].fixed == fixed_none)
+      if (model_.nodes[i].position.x > 101 && model_.nodes[i].fixed == model::fixed_none)
         nodes.push_back(i);
     return nodes;
   }
   // Weak, so that it does not throw about what the node of the other one goes past.
-  Attach tie() const { return {0, {top()}, 1, {top()}, 100}; }
-  SetTwoStep two_step() const {
-    if (way_ == Way::two_step)
-      return {0, {.threshold = 1}, {}, std::make_shared<const Model>(stiffer(model_))};
+  scene::Attach tie() const { return {0, {top()}, 1, {top()}, 100}; }
+  scene::SetTwoStep two_step() const {
+    if (way_ == scene::Way::two_step)
+      return {0, {.threshold = 1}, {}, std::make_shared<const model::Model>(stiffer(model_))};
     return {0, {.threshold = 1}, [model = stiffer(model_)] {
-              return compliance_of_factor(
-                  [model] { return Factor(stiffness_matrix(model), Context{}); });
+              return compliance::compliance_of_factor(
+                  [model] { return linalg::Factor(fem::stiffness_matrix(model), Context{}); });
             }};
   }
-  static PlaneToCut through() { return {{{100.2, -50, 30}, {1, 0.1, 0}}, {}}; }
-  PlaneToCut lower_incision() const {
-    PlaneToCut cut{{{100.2, -50, 30}, {0.1, 1, 0}}, std::vector<std::uint32_t>{}};
-    const Model& now = scene_.model(0);
-    for (std::uint32_t i = 0; i < surface_count(now); ++i)
+  static scene::PlaneToCut through() { return {{{100.2, -50, 30}, {1, 0.1, 0}}, {}}; }
+  scene::PlaneToCut lower_incision() const {
+    scene::PlaneToCut cut{{{100.2, -50, 30}, {0.1, 1, 0}}, std::vector<std::uint32_t>{}};
+    const model::Model& now = scene_.model(0);
+    for (std::uint32_t i = 0; i < model::surface_count(now); ++i)
       if (now.nodes[i].position.z > 40)
         cut.nodes->push_back(i);
     return cut;
@@ -264,36 +272,36 @@ private:
     return max > 0;
   }
   bool sweep() {
-    InstrumentShape edge;
+    contact::InstrumentShape edge;
     edge.radius = 0;
     edge.blade = true;
     edge.axis = {0, 0, is_solid(way_) ? -80.0 : -8.0}; // solids are cut through
     const double away = is_solid(way_) ? 40 : 12;
-    scene_.apply(SetInstrument{0, edge, {{100 - away, -50.3, 53}, {}}, "blade"});
+    scene_.apply(scene::SetInstrument{0, edge, {{100 - away, -50.3, 53}, {}}, "blade"});
     scene_.step(0);
-    scene_.apply(MoveInstrument{0, {100 + away, -50.3, 53}, {}, 0.01});
+    scene_.apply(scene::MoveInstrument{0, {100 + away, -50.3, 53}, {}, 0.01});
     for (int k = 0; k < 10; ++k)
       scene_.step(0.001);
     std::set<std::size_t> cut;
-    for (const Cutting& c : scene_.news().cuttings)
+    for (const scene::Cutting& c : scene_.news().cuttings)
       cut.insert(c.object);
     return cut.contains(0);
   }
 
-  Model model_;
-  Way way_;
-  Simulation scene_;
+  model::Model model_;
+  scene::Way way_;
+  scene::Simulation scene_;
 };
 
 TEST(Support, EveryPairWorksOrIsRefusedByItsWords) {
-  for (const Way way : all_ways)
-    for (const Feature feature : all_features) {
+  for (const scene::Way way : scene::all_ways)
+    for (const scene::Feature feature : scene::all_features) {
       SCOPED_TRACE("way " + std::to_string(static_cast<int>(way)) + ", feature " +
                    std::to_string(static_cast<int>(feature)));
       std::vector<std::string> warnings;
       Pair pair(way, warnings);
       warnings.clear();
-      const Gap* const gap = expected(way, feature);
+      const scene::Gap* const gap = expected(way, feature);
       std::string text = gap != nullptr ? "object o " + std::string(gap->text) : "";
       if (const std::size_t at = text.find('*'); at != std::string::npos)
         text.replace(at, 1, "p");
@@ -314,16 +322,16 @@ TEST(Support, EveryPairWorksOrIsRefusedByItsWords) {
 }
 
 TEST(Support, TheTableNamesEachPairOnceAndEachGapIsReached) {
-  std::set<std::pair<Way, Feature>> named;
-  for (const Gap& one : gaps) {
+  std::set<std::pair<scene::Way, scene::Feature>> named;
+  for (const scene::Gap& one : scene::gaps) {
     EXPECT_TRUE(named.emplace(one.way, one.feature).second);
     EXPECT_FALSE(one.text.empty());
     bool reached = false;
-    for (const Way way : all_ways)
+    for (const scene::Way way : scene::all_ways)
       reached = reached || expected(way, one.feature) == &one;
     EXPECT_TRUE(reached) << one.text;
   }
 }
 
 } // namespace
-} // namespace gewebe
+} // namespace gewebe::test

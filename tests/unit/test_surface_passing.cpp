@@ -18,13 +18,13 @@
 #include <string>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::test {
 namespace {
 
 using test::one_thread;
 
-SolidModelOptions gel() {
-  SolidModelOptions options;
+fem::SolidModelOptions gel() {
+  fem::SolidModelOptions options;
   options.material.materials = {{"gel", 1e-3, 2e4, 1, 0.2, 0.4}};
   options.quadratic = false;
   return options;
@@ -32,8 +32,8 @@ SolidModelOptions gel() {
 
 /// Two tetrahedra whose long edges cross over each other at right angles, 0.1 mm apart along z: no
 /// node of one comes near the other.
-TetMesh wedge(bool upper) {
-  TetMesh mesh;
+tetrahedra::TetMesh wedge(bool upper) {
+  tetrahedra::TetMesh mesh;
   if (upper)
     mesh.points = {{0, -10, 0.1}, {0, 10, 0.1}, {-3, 0, 5}, {3, 0, 5}};
   else
@@ -46,11 +46,11 @@ TetMesh wedge(bool upper) {
   return mesh;
 }
 
-void add(Simulation& s, const std::string& name, const Model& model) {
-  s.add_object(name, model, Method::ela, {}, Integration::implicit);
+void add(scene::Simulation& s, const std::string& name, const model::Model& model) {
+  s.add_object(name, model, scene::Method::ela, {}, scene::Integration::implicit);
 }
 
-double lowest(const Simulation& s, std::size_t object) {
+double lowest(const scene::Simulation& s, std::size_t object) {
   double z = HUGE_VAL;
   const std::vector<double> u = test::shape(s, object);
   for (std::size_t i = 0; i < s.model(object).nodes.size(); ++i)
@@ -59,42 +59,42 @@ double lowest(const Simulation& s, std::size_t object) {
 }
 
 TEST(SurfacePassing, AWedgeRestsAcrossAnother) {
-  Simulation s(one_thread(), {});
-  Model below = solid_model(wedge(false), gel(), {});
-  for (Node& n : below.nodes)
-    n.fixed = fixed_all;
-  Model above = solid_model(wedge(true), gel(), {});
-  for (Node& n : above.nodes)
+  scene::Simulation s(one_thread(), {});
+  model::Model below = fem::solid_model(wedge(false), gel(), {});
+  for (model::Node& n : below.nodes)
+    n.fixed = model::fixed_all;
+  model::Model above = fem::solid_model(wedge(true), gel(), {});
+  for (model::Node& n : above.nodes)
     n.fixed = 3; // it slides along z alone
   add(s, "below", below);
   add(s, "above", above);
-  s.apply(SetGravity{{0, 0, -9810}});
-  s.apply(SetContact{0, 1, 0});
+  s.apply(scene::SetGravity{{0, 0, -9810}});
+  s.apply(scene::SetContact{0, 1, 0});
   for (int k = 0; k < 20; ++k)
     s.step(1.0 / 60);
   EXPECT_GT(lowest(s, 1), 0);
   Vec3 sum;
-  for (const NodeVector& f : s.contact_forces(1))
+  for (const contact::NodeVector& f : s.contact_forces(1))
     sum += f.value;
   EXPECT_GT(sum.z, 0);
 }
 
 /// So fast that it would be beyond the plate in one step: it stays above.
 TEST(SurfacePassing, AFastBlockDoesNotPass) {
-  Simulation s(one_thread(), {});
-  Model plate = solid_model(test::box_tetrahedra(4, 4, 1, 4), gel(), {});
-  for (Node& n : plate.nodes)
-    n.fixed = fixed_all;
-  SolidModelOptions firm = gel();
+  scene::Simulation s(one_thread(), {});
+  model::Model plate = fem::solid_model(test::box_tetrahedra(4, 4, 1, 4), gel(), {});
+  for (model::Node& n : plate.nodes)
+    n.fixed = model::fixed_all;
+  fem::SolidModelOptions firm = gel();
   firm.material.materials[0].young = 2e5;
-  Model cube = solid_model(test::box_tetrahedra(1, 1, 1, 4), firm, {});
-  for (Node& n : cube.nodes)
+  model::Model cube = fem::solid_model(test::box_tetrahedra(1, 1, 1, 4), firm, {});
+  for (model::Node& n : cube.nodes)
     n.position += Vec3{6.3, 5.9, 13};
   add(s, "plate", plate);
   add(s, "cube", cube);
-  s.apply(SetTimestep{1.0 / 60});
-  s.apply(SetGravity{{0, 0, -9810}});
-  s.apply(SetContact{0, 1, 0});
+  s.apply(scene::SetTimestep{1.0 / 60});
+  s.apply(scene::SetGravity{{0, 0, -9810}});
+  s.apply(scene::SetContact{0, 1, 0});
   double least = HUGE_VAL;
   for (int k = 0; k < 8; ++k) {
     s.step(1.0 / 60);
@@ -106,19 +106,20 @@ TEST(SurfacePassing, AFastBlockDoesNotPass) {
 
 /// A bag without anything inside falls on a floor; its walls come to lie on each other.
 TEST(SurfacePassing, ALimpBagLiesOnAFloor) {
-  Simulation s(one_thread(), {});
-  BuildOptions options;
+  scene::Simulation s(one_thread(), {});
+  model::BuildOptions options;
   options.bend = true;
   options.centrals = 0;
-  Model bag = build_model(test::ball(1, 10, {8.3, 8.1, 15}), options, Context{}).model;
-  Model floor = solid_model(test::box_tetrahedra(4, 4, 1, 4), gel(), {});
-  for (Node& n : floor.nodes)
-    n.fixed = fixed_all;
+  model::Model bag =
+      model::build_model(test::ball(1, 10, {8.3, 8.1, 15}), options, Context{}).model;
+  model::Model floor = fem::solid_model(test::box_tetrahedra(4, 4, 1, 4), gel(), {});
+  for (model::Node& n : floor.nodes)
+    n.fixed = model::fixed_all;
   add(s, "floor", floor);
   add(s, "bag", bag);
-  s.apply(SetGravity{{0, 0, -9810}});
-  s.apply(SetContact{0, 1, 0.3});
-  s.apply(SetContact{1, 1, 0.3});
+  s.apply(scene::SetGravity{{0, 0, -9810}});
+  s.apply(scene::SetContact{0, 1, 0.3});
+  s.apply(scene::SetContact{1, 1, 0.3});
   for (int k = 0; k < 12; ++k)
     s.step(1.0 / 60);
   EXPECT_GT(lowest(s, 1), 4);
@@ -126,4 +127,4 @@ TEST(SurfacePassing, ALimpBagLiesOnAFloor) {
 }
 
 } // namespace
-} // namespace gewebe
+} // namespace gewebe::test

@@ -29,24 +29,24 @@
 #include <utility>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::test {
 namespace {
 
 /// A box 2 × 2 × 2 whose inner nodes stand anywhere, held at z = 0.
-Model box_model(double young = 5000) {
-  SolidModelOptions options;
+model::Model box_model(double young = 5000) {
+  fem::SolidModelOptions options;
   options.material.materials = {{"gel", 1.1e-3, young, 1, 0.2, 0.4}};
-  Model model = solid_model(test::distorted_box(), options, {});
-  for (Node& node : model.nodes)
+  model::Model model = fem::solid_model(test::distorted_box(), options, {});
+  for (model::Node& node : model.nodes)
     if (node.position.z == 0)
-      node.fixed = fixed_all;
+      node.fixed = model::fixed_all;
   return model;
 }
 
 /// What compliance_columns gives, in memory.
-class Kept final : public ColumnSource, public ColumnSink {
+class Kept final : public columns::ColumnSource, public columns::ColumnSink {
 public:
-  Kept(const Model& model, std::size_t rows, std::vector<std::uint32_t> nodes)
+  Kept(const model::Model& model, std::size_t rows, std::vector<std::uint32_t> nodes)
       : count_(model.nodes.size()), rows_(rows), nodes_(std::move(nodes)) {}
   std::size_t node_count() const override { return count_; }
   std::size_t row_nodes() const override { return rows_; }
@@ -72,24 +72,27 @@ std::vector<std::uint32_t> first_nodes(std::size_t count) {
 }
 
 /// Columns of all surface nodes with rows for so many.
-std::unique_ptr<Kept> columns_of(const Model& model, std::size_t rows) {
-  const StiffnessMatrix k = stiffness_matrix(model);
-  auto columns = std::make_unique<Kept>(model, rows, first_nodes(surface_count(model)));
-  (void)compliance_columns(k, Factor(k, {}), stiffness_norm(k), columns->nodes(), {}, *columns,
-                           rows);
+std::unique_ptr<Kept> columns_of(const model::Model& model, std::size_t rows) {
+  const linalg::StiffnessMatrix k = fem::stiffness_matrix(model);
+  auto columns = std::make_unique<Kept>(model, rows, first_nodes(model::surface_count(model)));
+  (void)columns::compliance_columns(k, linalg::Factor(k, {}), linalg::stiffness_norm(k),
+                                    columns->nodes(), {}, *columns, rows);
   return columns;
 }
 
-std::shared_ptr<ComplianceSource> stored(const Model& model, std::size_t rows, double wrong = 1) {
+std::shared_ptr<compliance::ComplianceSource> stored(const model::Model& model, std::size_t rows,
+                                                     double wrong = 1) {
   auto columns = columns_of(model, rows);
   for (double& entry : columns->kept.back())
     entry *= wrong;
-  return compliance_of_store(
-      {std::move(columns), [&model] { return Factor(stiffness_matrix(model), Context{}); }});
+  return compliance::compliance_of_store(
+      {std::move(columns),
+       [&model] { return linalg::Factor(fem::stiffness_matrix(model), Context{}); }});
 }
 
-std::shared_ptr<ComplianceSource> surface_of(const Model& model, double wrong = 1) {
-  return stored(model, surface_count(model), wrong);
+std::shared_ptr<compliance::ComplianceSource> surface_of(const model::Model& model,
+                                                         double wrong = 1) {
+  return stored(model, model::surface_count(model), wrong);
 }
 
 double largest(std::span<const double> values) {
@@ -112,17 +115,17 @@ void expect_near(std::span<const double> a, std::span<const double> b, double to
 struct Places {
   std::vector<std::uint32_t> outer, inner;
 };
-Places places_of(const Model& model) {
+Places places_of(const model::Model& model) {
   Places places;
   for (std::uint32_t i = 0; i < model.nodes.size(); ++i)
-    if (model.nodes[i].fixed == fixed_none)
-      (i < surface_count(model) ? places.outer : places.inner).push_back(i);
+    if (model.nodes[i].fixed == model::fixed_none)
+      (i < model::surface_count(model) ? places.outer : places.inner).push_back(i);
   return places;
 }
 
 TEST(SurfaceRows, AreTheFirstOfAllRows) {
-  const Model model = box_model();
-  const std::size_t surface = surface_count(model), n = model.nodes.size();
+  const model::Model model = box_model();
+  const std::size_t surface = model::surface_count(model), n = model.nodes.size();
   ASSERT_LT(surface + 20, n);
   const auto some = columns_of(model, surface), all = columns_of(model, n);
   for (std::size_t k = 0; k < some->kept.size(); ++k) {
@@ -134,10 +137,10 @@ TEST(SurfaceRows, AreTheFirstOfAllRows) {
 }
 
 TEST(SurfaceRows, AreTheInverseOfTheCondensedStiffness) {
-  const Model model = box_model();
-  const StiffnessMatrix k = stiffness_matrix(model);
+  const model::Model model = box_model();
+  const linalg::StiffnessMatrix k = fem::stiffness_matrix(model);
   const auto n = static_cast<Eigen::Index>(k.order());
-  const std::size_t axes = 3 * surface_count(model);
+  const std::size_t axes = 3 * model::surface_count(model);
   Eigen::MatrixXd dense = Eigen::MatrixXd::Zero(n, n);
   for (std::size_t c = 0; c < k.order(); ++c)
     for (auto at = k.column_start[c]; at < k.column_start[c + 1]; ++at) {
@@ -153,7 +156,7 @@ TEST(SurfaceRows, AreTheInverseOfTheCondensedStiffness) {
       dense.topLeftCorner(outer, outer) -
       dense.topRightCorner(outer, inner) *
           dense.bottomRightCorner(inner, inner).llt().solve(dense.bottomLeftCorner(inner, outer));
-  const auto columns = columns_of(model, surface_count(model));
+  const auto columns = columns_of(model, model::surface_count(model));
   Eigen::MatrixXd compliance(outer, outer);
   for (Eigen::Index c = 0; c < outer; ++c)
     for (Eigen::Index r = 0; r < outer; ++r) {
@@ -166,22 +169,22 @@ TEST(SurfaceRows, AreTheInverseOfTheCondensedStiffness) {
 }
 
 TEST(SurfaceRows, AreVerified) {
-  const Model model = box_model();
-  const StiffnessMatrix k = stiffness_matrix(model);
-  StiffnessCheck check;
-  const Factor factor = checked_factor(model, k, {}, check);
-  const VerifyOptions options{.condition = check.condition};
-  auto columns = columns_of(model, surface_count(model));
-  EXPECT_EQ(verify_compliance(k, factor, columns.get(), options, {}).recomputed, 3U);
+  const model::Model model = box_model();
+  const linalg::StiffnessMatrix k = fem::stiffness_matrix(model);
+  linalg::StiffnessCheck check;
+  const linalg::Factor factor = linalg::checked_factor(model, k, {}, check);
+  const columns::VerifyOptions options{.condition = check.condition};
+  auto columns = columns_of(model, model::surface_count(model));
+  EXPECT_EQ(columns::verify_compliance(k, factor, columns.get(), options, {}).recomputed, 3U);
   // The last row of one that is solved for again.
   columns->kept[columns->kept.size() / 2].back() += 1e-6 * largest(columns->kept.back());
-  EXPECT_THROW((void)verify_compliance(k, factor, columns.get(), options, {}), Error);
+  EXPECT_THROW((void)columns::verify_compliance(k, factor, columns.get(), options, {}), Error);
 }
 
 /// Loads of each kind, one after the other.
-std::vector<Load> loads_of(const Model& model) {
+std::vector<contact::Load> loads_of(const model::Model& model) {
   const Places at = places_of(model);
-  std::vector<Load> loads(9);
+  std::vector<contact::Load> loads(9);
   const auto push = [](std::size_t k) {
     return Vec3{1.0 + static_cast<double>(k), -2, 3 - static_cast<double>(k)};
   };
@@ -210,15 +213,16 @@ std::vector<Load> loads_of(const Model& model) {
 }
 
 TEST(SurfaceRows, GiveWhatAllRowsGive) {
-  const Model model = box_model();
+  const model::Model model = box_model();
   for (const std::size_t limit : {SIZE_MAX, std::size_t{0}}) {
-    const ElastostaticOptions options{.measure_error = true, .block_limit = limit};
-    Elastostatic some(model, surface_of(model), {}, options);
-    Elastostatic never(model, surface_of(model), {}, {.block_limit = limit}); // asked for the whole
-    Elastostatic all(model, nullptr, {}, options);
-    const std::size_t rows = 3 * surface_count(model);
+    const statics::ElastostaticOptions options{.measure_error = true, .block_limit = limit};
+    statics::Elastostatic some(model, surface_of(model), {}, options);
+    statics::Elastostatic never(model, surface_of(model), {},
+                                {.block_limit = limit}); // asked for the whole
+    statics::Elastostatic all(model, nullptr, {}, options);
+    const std::size_t rows = 3 * model::surface_count(model);
     int number = 0;
-    for (const Load& load : loads_of(model)) {
+    for (const contact::Load& load : loads_of(model)) {
       SCOPED_TRACE(number++);
       some.update(load);
       never.update(load);
@@ -244,24 +248,24 @@ TEST(SurfaceRows, GiveWhatAllRowsGive) {
 }
 
 /// Compressed columns which say of themselves `claimed` times the bound that they have.
-std::shared_ptr<ComplianceSource> compressed(const Model& model, double relative,
-                                             std::size_t step = 1, double claimed = 1) {
-  CompressedMade made = test::compressed_surface(model, relative, step);
+std::shared_ptr<compliance::ComplianceSource> compressed(const model::Model& model, double relative,
+                                                         std::size_t step = 1, double claimed = 1) {
+  columns::CompressedMade made = test::compressed_surface(model, relative, step);
   made.layout.bound *= claimed;
   return test::compressed(model, std::move(made));
 }
 
 // Nodes with columns, without, and inside, in all mixtures.
 TEST(SurfaceRows, OfCompressedColumnsGiveWhatAllRowsGive) {
-  const Model model = box_model();
-  const std::size_t surface = surface_count(model);
+  const model::Model model = box_model();
+  const std::size_t surface = model::surface_count(model);
   for (const std::size_t step : {1U, 2U})
     for (const std::size_t limit : {SIZE_MAX, std::size_t{0}}) {
-      const ElastostaticOptions options{.block_limit = limit};
-      Elastostatic some(model, compressed(model, 1e-7, step), {}, options);
-      Elastostatic all(model, nullptr, {}, options);
+      const statics::ElastostaticOptions options{.block_limit = limit};
+      statics::Elastostatic some(model, compressed(model, 1e-7, step), {}, options);
+      statics::Elastostatic all(model, nullptr, {}, options);
       int number = 0;
-      for (const Load& load : loads_of(model)) {
+      for (const contact::Load& load : loads_of(model)) {
         SCOPED_TRACE(number++);
         some.update(load);
         all.update(load);
@@ -270,8 +274,8 @@ TEST(SurfaceRows, OfCompressedColumnsGiveWhatAllRowsGive) {
         expect_near(some.displacement(), all.displacement(), 1e-5, "whole");
         const std::vector<std::uint32_t> touched{
             places_of(model).outer[1], places_of(model).outer[4], places_of(model).inner[3]};
-        const DelassusOperator a = some.delassus_operator(load, touched),
-                               b = all.delassus_operator(load, touched);
+        const statics::DelassusOperator a = some.delassus_operator(load, touched),
+                                        b = all.delassus_operator(load, touched);
         expect_near(a.compliance, b.compliance, 1e-5, "compliance");
       }
     }
@@ -279,12 +283,12 @@ TEST(SurfaceRows, OfCompressedColumnsGiveWhatAllRowsGive) {
 
 // Of sets that share nodes, one behind the other, and of each of them alone.
 TEST(SurfaceRows, DelassusOperatorsDoNotDependOnThoseBefore) {
-  const Model model = box_model();
+  const model::Model model = box_model();
   const std::vector<std::uint32_t> at = places_of(model).outer;
   ASSERT_GT(at.size(), 9);
   for (const bool stored : {false, true}) {
     const auto source = [&] { return stored ? compressed(model, 1e-6) : nullptr; };
-    Elastostatic one(model, source(), {});
+    statics::Elastostatic one(model, source(), {});
     for (const std::vector<std::size_t>& set : {std::vector<std::size_t>{1, 3, 5},
                                                 {3, 5, 7, 8},
                                                 {3, 5, 7, 8},
@@ -295,7 +299,7 @@ TEST(SurfaceRows, DelassusOperatorsDoNotDependOnThoseBefore) {
       for (const std::size_t k : set)
         nodes.push_back(at[k]);
       std::ranges::sort(nodes);
-      Elastostatic alone(model, source(), {});
+      statics::Elastostatic alone(model, source(), {});
       EXPECT_EQ(one.delassus_operator({}, nodes).compliance,
                 alone.delassus_operator({}, nodes).compliance);
     }
@@ -303,11 +307,12 @@ TEST(SurfaceRows, DelassusOperatorsDoNotDependOnThoseBefore) {
 }
 
 TEST(SurfaceRows, OfCompressedColumnsHaveBlocksWithTheInside) {
-  const Model model = box_model();
-  Compliance some(model, compressed(model, 1e-7), {}, false), all(model, nullptr, {}, false);
+  const model::Model model = box_model();
+  compliance::Compliance some(model, compressed(model, 1e-7), {}, false),
+      all(model, nullptr, {}, false);
   const Places at = places_of(model);
   const std::vector<std::uint32_t> nodes{at.outer[2], at.outer[20], at.inner[1], at.inner[7]};
-  for (Compliance* const compliance : {&some, &all}) {
+  for (compliance::Compliance* const compliance : {&some, &all}) {
     compliance->need(nodes);
     compliance->need_blocks(nodes);
   }
@@ -325,9 +330,9 @@ TEST(SurfaceRows, OfCompressedColumnsHaveBlocksWithTheInside) {
 }
 
 TEST(SurfaceRows, OfCompressedColumnsCostNoSolveUntilTheInsideIsAskedFor) {
-  const Model model = box_model();
-  Elastostatic object(model, compressed(model, 1e-4), {});
-  const std::vector<Load> loads = loads_of(model);
+  const model::Model model = box_model();
+  statics::Elastostatic object(model, compressed(model, 1e-4), {});
+  const std::vector<contact::Load> loads = loads_of(model);
   for (const std::size_t k : {0U, 2U, 7U, 2U}) {
     object.update(loads[k]);
     (void)object.surface_displacement();
@@ -339,15 +344,15 @@ TEST(SurfaceRows, OfCompressedColumnsCostNoSolveUntilTheInsideIsAskedFor) {
 }
 
 TEST(SurfaceRows, InnerNodesFollowAChangeOfGravity) {
-  const Model model = box_model();
-  Elastostatic some(model, surface_of(model), {}), all(model, nullptr, {});
-  Compliance compliance(model, surface_of(model), {}, false);
-  LoadAnswer answer(model, compliance);
+  const model::Model model = box_model();
+  statics::Elastostatic some(model, surface_of(model), {}), all(model, nullptr, {});
+  compliance::Compliance compliance(model, surface_of(model), {}, false);
+  compliance::LoadAnswer answer(model, compliance);
   const Places at = places_of(model);
   const std::vector<std::size_t> rows{3 * std::size_t{at.inner[2]},
                                       3 * std::size_t{at.inner[2]} + 2,
                                       3 * std::size_t{at.outer[3]} + 1};
-  Load load;
+  contact::Load load;
   load.force[at.outer[5]] = {0, 3, 1};
   for (const Vec3& gravity : {Vec3{0, 0, -100}, {50, 0, 0}, {}, {0, 0, -100}}) {
     load.gravity = gravity;
@@ -362,9 +367,9 @@ TEST(SurfaceRows, InnerNodesFollowAChangeOfGravity) {
 }
 
 TEST(SurfaceRows, CostNoSolveUntilTheInsideIsAskedFor) {
-  const Model model = box_model();
-  Elastostatic object(model, surface_of(model), {});
-  const std::vector<Load> loads = loads_of(model);
+  const model::Model model = box_model();
+  statics::Elastostatic object(model, surface_of(model), {});
+  const std::vector<contact::Load> loads = loads_of(model);
   for (const std::size_t k : {0U, 2U, 7U, 2U}) {
     object.update(loads[k]);
     (void)object.surface_displacement();
@@ -379,16 +384,16 @@ TEST(SurfaceRows, CostNoSolveUntilTheInsideIsAskedFor) {
 }
 
 TEST(SurfaceRows, OfContactAreTheSame) {
-  const Model model = box_model();
+  const model::Model model = box_model();
   const Places at = places_of(model);
   const std::vector<std::uint32_t> touched{at.outer[1], at.outer[4], at.outer[30]};
   for (const std::size_t limit : {SIZE_MAX, std::size_t{0}}) {
-    Elastostatic some(model, surface_of(model), {}, {.block_limit = limit}),
+    statics::Elastostatic some(model, surface_of(model), {}, {.block_limit = limit}),
         all(model, nullptr, {}, {.block_limit = limit});
     for (const std::size_t k : {1U, 3U, 4U, 5U}) {
-      const Load load = loads_of(model)[k];
-      const DelassusOperator a = some.delassus_operator(load, touched),
-                             b = all.delassus_operator(load, touched);
+      const contact::Load load = loads_of(model)[k];
+      const statics::DelassusOperator a = some.delassus_operator(load, touched),
+                                      b = all.delassus_operator(load, touched);
       expect_near(a.compliance, b.compliance, 1e-10, "compliance");
       expect_near(a.free, b.free, 1e-9, "free");
     }
@@ -396,10 +401,10 @@ TEST(SurfaceRows, OfContactAreTheSame) {
 }
 
 TEST(SurfaceRows, ThatAreWrongAreMeasured) {
-  const Model model = box_model();
-  Elastostatic object(model, surface_of(model, 1.001), {}, {.measure_error = true});
-  Load load;
-  load.force[static_cast<std::uint32_t>(surface_count(model) - 1)] = {1, 2, 3};
+  const model::Model model = box_model();
+  statics::Elastostatic object(model, surface_of(model, 1.001), {}, {.measure_error = true});
+  contact::Load load;
+  load.force[static_cast<std::uint32_t>(model::surface_count(model) - 1)] = {1, 2, 3};
   object.update(load);
   (void)object.surface_displacement();
   EXPECT_GT(object.counts().backward_error, 1e-5);
@@ -410,18 +415,18 @@ TEST(SurfaceRows, ThatAreWrongAreMeasured) {
 
 // A shape may be wrong by what the bound allows under its own forces, and not by more.
 TEST(SurfaceRows, OfCompressedColumnsAreAsWrongAsTheirBoundSays) {
-  const Model model = box_model();
+  const model::Model model = box_model();
   const auto worst = [&](double relative, double claimed) {
-    Elastostatic object(model, compressed(model, relative, 1, claimed), {},
-                        {.measure_error = true});
-    for (const Load& load : loads_of(model)) {
+    statics::Elastostatic object(model, compressed(model, relative, 1, claimed), {},
+                                 {.measure_error = true});
+    for (const contact::Load& load : loads_of(model)) {
       object.update(load);
       (void)object.surface_displacement();
     }
     return object.counts().worst_shape;
   };
   for (const double relative : {1e-2, 1e-4}) {
-    const ShapeError good = worst(relative, 1);
+    const statics::ShapeError good = worst(relative, 1);
     EXPECT_TRUE(good.within()) << good.error << " > " << good.limit;
     EXPECT_EQ(good.relative, relative);
     EXPECT_GT(good.limit, 1e-6);
@@ -431,26 +436,30 @@ TEST(SurfaceRows, OfCompressedColumnsAreAsWrongAsTheirBoundSays) {
 }
 
 TEST(SurfaceRows, OfOtherNodesAreRefused) {
-  const Model model = box_model();
-  EXPECT_THROW(Elastostatic(model, stored(model, surface_count(model) - 1), {}), Error);
-  EXPECT_THROW(Elastostatic(model, stored(model, surface_count(model) + 1), {}), Error);
-  EXPECT_NO_THROW(Elastostatic(model, stored(model, model.nodes.size()), {}));
+  const model::Model model = box_model();
+  EXPECT_THROW(statics::Elastostatic(model, stored(model, model::surface_count(model) - 1), {}),
+               Error);
+  EXPECT_THROW(statics::Elastostatic(model, stored(model, model::surface_count(model) + 1), {}),
+               Error);
+  EXPECT_NO_THROW(statics::Elastostatic(model, stored(model, model.nodes.size()), {}));
 }
 
 TEST(SurfaceRows, OfTwoStagesAreTheSame) {
-  const Model soft = box_model(), stiff = box_model(20000);
-  Elastostatic some(soft, surface_of(soft), {}), all(soft, nullptr, {});
-  const TwoStepOptions options{.threshold = 3, .series = true};
-  TwoStep two_some(soft, surface_of(stiff), {}, options),
-      two_all(soft, compliance_of_factor([&] { return Factor(stiffness_matrix(stiff), {}); }), {},
-              options);
+  const model::Model soft = box_model(), stiff = box_model(20000);
+  statics::Elastostatic some(soft, surface_of(soft), {}), all(soft, nullptr, {});
+  const statics::TwoStepOptions options{.threshold = 3, .series = true};
+  statics::TwoStep two_some(soft, surface_of(stiff), {}, options),
+      two_all(soft, compliance::compliance_of_factor([&] {
+                return linalg::Factor(fem::stiffness_matrix(stiff), {});
+              }),
+              {}, options);
   for (const std::size_t k : {0U, 2U, 3U, 5U}) {
-    const Load load = loads_of(soft)[k];
+    const contact::Load load = loads_of(soft)[k];
     two_some.update(some, load);
     two_all.update(all, load);
     EXPECT_GT(two_some.load(), options.threshold);
     const std::span<const double> surface = two_some.surface_displacement(some);
-    ASSERT_EQ(surface.size(), 3 * surface_count(soft));
+    ASSERT_EQ(surface.size(), 3 * model::surface_count(soft));
     expect_near(surface, two_all.displacement(all), 1e-9, "surface");
     ASSERT_EQ(two_some.displacement(some).size(), 3 * soft.nodes.size());
     expect_near(two_some.displacement(some), two_all.displacement(all), 1e-9, "whole");
@@ -458,20 +467,20 @@ TEST(SurfaceRows, OfTwoStagesAreTheSame) {
 }
 
 TEST(SurfaceRows, OfASceneGiveItsWholeShapeWhenAsked) {
-  const Model model = box_model();
-  const std::size_t n = model.nodes.size(), surface = surface_count(model);
+  const model::Model model = box_model();
+  const std::size_t n = model.nodes.size(), surface = model::surface_count(model);
   const std::uint32_t inside = places_of(model).inner[4];
-  Simulation some({}, {}), never({}, {}), all({}, {});
-  some.add_object("o", model, Method::ffe, surface_of(model));
-  never.add_object("o", model, Method::ffe, surface_of(model));
-  all.add_object("o", model, Method::ffe, nullptr);
+  scene::Simulation some({}, {}), never({}, {}), all({}, {});
+  some.add_object("o", model, scene::Method::ffe, surface_of(model));
+  never.add_object("o", model, scene::Method::ffe, surface_of(model));
+  all.add_object("o", model, scene::Method::ffe, nullptr);
   EXPECT_EQ(some.surface_nodes(0), surface);
-  const auto both = [&](const Change& change) {
-    for (Simulation* const s : {&some, &never, &all})
+  const auto both = [&](const scene::Change& change) {
+    for (scene::Simulation* const s : {&some, &never, &all})
       s->apply(change);
   };
   const auto compare = [&](const char* what, double tolerance) {
-    for (Simulation* const s : {&some, &never, &all})
+    for (scene::Simulation* const s : {&some, &never, &all})
       s->step(0.01);
     ASSERT_EQ(some.displacement(0).size(), 3 * n);
     EXPECT_GT(largest(some.displacement(0)), 0);
@@ -481,45 +490,45 @@ TEST(SurfaceRows, OfASceneGiveItsWholeShapeWhenAsked) {
     ASSERT_EQ(a.size(), b.size());
     EXPECT_TRUE(std::equal(a.begin(), a.end(), b.begin())) << what;
   };
-  both(SetForce{0, {places_of(model).outer[9]}, {3, 4, 5}});
+  both(scene::SetForce{0, {places_of(model).outer[9]}, {3, 4, 5}});
   compare("force", 1e-10);
-  both(SetForce{0, {inside}, {30, 4, 5}});
+  both(scene::SetForce{0, {inside}, {30, 4, 5}});
   compare("a force inside", 1e-10);
   // A ball pressed into its top: contact needs the surface alone.
-  both(SetInstrument{0, {0.8, {}, 0.2}, {{1, 1, 3}, {}}, "ball"});
+  both(scene::SetInstrument{0, {0.8, {}, 0.2}, {{1, 1, 3}, {}}, "ball"});
   compare("a ball above", 1e-10);
-  both(MoveInstrument{0, {1, 1, 2.6}, {}, 0});
+  both(scene::MoveInstrument{0, {1, 1, 2.6}, {}, 0});
   // Rounding differs, so that contact is solved to its own tolerance alike, not to the bit: without
   // friction to 1e-4, with it to its last change, which is of 1e-3 of a force.
   constexpr double contact_met = 2e-3;
   compare("a ball presses", contact_met);
   ASSERT_GT(some.instrument(0).nodes, 2U);
-  both(Grasp{0, {inside}, 0});
-  both(MoveInstrument{0, {1.1, 1, 2.7}, {}, 0});
+  both(scene::Grasp{0, {inside}, 0});
+  both(scene::MoveInstrument{0, {1.1, 1, 2.7}, {}, 0});
   compare("a node inside follows it", contact_met);
   const std::uint64_t solves = never.counts().elastostatic.solves;
   EXPECT_GT(some.counts().elastostatic.solves, solves);
 }
 
 TEST(SurfaceRows, OfASceneCostNoSolve) {
-  const Model model = box_model();
-  Simulation scene({}, {});
-  scene.add_object("o", model, Method::ffe, surface_of(model));
-  scene.apply(Emit{.surfaces = true});
-  scene.apply(SetInstrument{0, {0.8, {}, 0.2}, {{1, 1, 2.7}, {}}, "ball"});
+  const model::Model model = box_model();
+  scene::Simulation scene({}, {});
+  scene.add_object("o", model, scene::Method::ffe, surface_of(model));
+  scene.apply(scene::Emit{.surfaces = true});
+  scene.apply(scene::SetInstrument{0, {0.8, {}, 0.2}, {{1, 1, 2.7}, {}}, "ball"});
   for (int k = 0; k < 5; ++k) {
-    scene.apply(MoveInstrument{0, {1 + 0.01 * k, 1, 2.6}, {}, 0});
+    scene.apply(scene::MoveInstrument{0, {1 + 0.01 * k, 1, 2.6}, {}, 0});
     scene.step(0.01);
-    ASSERT_EQ(scene.surface_displacement(0).size(), 3 * surface_count(model));
+    ASSERT_EQ(scene.surface_displacement(0).size(), 3 * model::surface_count(model));
   }
   EXPECT_GT(scene.instrument(0).nodes, 2U);
   EXPECT_EQ(scene.counts().elastostatic.solves, 0U);
   EXPECT_EQ(scene.counts().elastostatic.factors, 0U);
-  scene.apply(Emit{}); // all nodes
-  scene.apply(MoveInstrument{0, {1, 1, 2.5}, {}, 0});
+  scene.apply(scene::Emit{}); // all nodes
+  scene.apply(scene::MoveInstrument{0, {1, 1, 2.5}, {}, 0});
   scene.step(0.01);
   EXPECT_GT(scene.counts().elastostatic.solves, 0U);
 }
 
 } // namespace
-} // namespace gewebe
+} // namespace gewebe::test

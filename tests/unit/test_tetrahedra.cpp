@@ -23,20 +23,20 @@
 #include <utility>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::test {
 namespace {
 
 using test::box_tetrahedra;
 using test::same_bytes;
 
-TetMesh one(const Vec3& a, const Vec3& b, const Vec3& c, const Vec3& d) {
-  TetMesh mesh;
+tetrahedra::TetMesh one(const Vec3& a, const Vec3& b, const Vec3& c, const Vec3& d) {
+  tetrahedra::TetMesh mesh;
   mesh.points = {a, b, c, d};
   mesh.tetrahedra = {{0, 1, 2, 3}};
   return mesh;
 }
 
-TetMesh regular() {
+tetrahedra::TetMesh regular() {
   return one({1, 1, 1}, {-1, 1, -1}, {1, -1, -1}, {-1, -1, 1});
 }
 
@@ -45,8 +45,8 @@ std::uint32_t draw(std::mt19937& random, std::uint32_t below) {
 }
 
 /// Corners below `points`, some of them equal, some tetrahedra twice.
-TetMesh random_mesh(std::mt19937& random, std::size_t count, std::uint32_t points) {
-  TetMesh mesh;
+tetrahedra::TetMesh random_mesh(std::mt19937& random, std::size_t count, std::uint32_t points) {
+  tetrahedra::TetMesh mesh;
   for (std::uint32_t p = 0; p < points; ++p)
     mesh.points.push_back({static_cast<double>(random() % 5), static_cast<double>(random() % 5),
                            static_cast<double>(random() % 5)});
@@ -63,24 +63,24 @@ TetMesh random_mesh(std::mt19937& random, std::size_t count, std::uint32_t point
   return mesh;
 }
 
-std::string complaint(const TetMesh& mesh) {
-  return test::complaint([&] { require_sound(examine_tetrahedra(mesh)); });
+std::string complaint(const tetrahedra::TetMesh& mesh) {
+  return test::complaint([&] { tetrahedra::require_sound(tetrahedra::examine_tetrahedra(mesh)); });
 }
 
-double volume_of(const TetMesh& mesh, std::size_t t) {
+double volume_of(const tetrahedra::TetMesh& mesh, std::size_t t) {
   const Tetrahedron& c = mesh.tetrahedra[t];
-  return tetrahedron_volume(mesh.points[c[0]], mesh.points[c[1]], mesh.points[c[2]],
-                            mesh.points[c[3]]);
+  return tetrahedra::tetrahedron_volume(mesh.points[c[0]], mesh.points[c[1]], mesh.points[c[2]],
+                                        mesh.points[c[3]]);
 }
 
 // ---- Boundary
 
 TEST(TetBoundary, OfABoxIsItsSurface) {
-  const TetMesh mesh = box_tetrahedra(3, 4, 5, 0.5);
+  const tetrahedra::TetMesh mesh = box_tetrahedra(3, 4, 5, 0.5);
   for (std::size_t t = 0; t < mesh.tetrahedra.size(); ++t)
     ASSERT_EQ(volume_of(mesh, t), 0.125 / 6) << t;
-  const TetBoundary surface = boundary(mesh);
-  const MeshReport report = examine_mesh(surface.mesh);
+  const tetrahedra::TetBoundary surface = tetrahedra::boundary(mesh);
+  const mesh::MeshReport report = mesh::examine_mesh(surface.mesh);
   EXPECT_EQ(report.triangles, 2U * 2 * (12 + 15 + 20));
   EXPECT_TRUE(report.closed() && report.manifold() && report.outward());
   EXPECT_EQ(report.euler, 2);
@@ -97,14 +97,14 @@ TEST(TetBoundary, OfABoxIsItsSurface) {
 TEST(TetBoundary, RandomOnesAsAMapCountsThem) {
   std::mt19937 random(1);
   for (int round = 0; round < 60; ++round) {
-    const TetMesh mesh = random_mesh(random, 1 + random() % 120, 4 + draw(random, 40));
+    const tetrahedra::TetMesh mesh = random_mesh(random, 1 + random() % 120, 4 + draw(random, 40));
     std::map<std::set<std::uint32_t>, int> count;
     for (const Tetrahedron& t : mesh.tetrahedra)
-      for (std::uint32_t k = 0; k < 4 && !has_equal_corners(t); ++k) {
-        const Triangle face = corners_of_face(t, k);
+      for (std::uint32_t k = 0; k < 4 && !tetrahedra::has_equal_corners(t); ++k) {
+        const Triangle face = tetrahedra::corners_of_face(t, k);
         ++count[{face.begin(), face.end()}];
       }
-    const TetBoundary surface = boundary(mesh);
+    const tetrahedra::TetBoundary surface = tetrahedra::boundary(mesh);
     std::vector<std::set<std::uint32_t>> expected, found;
     for (const auto& [face, n] : count)
       if (n == 1)
@@ -127,13 +127,13 @@ TEST(TetBoundary, RandomOnesAsAMapCountsThem) {
 }
 
 TEST(TetBoundary, CarriesMaterialAndMiddles) {
-  TetMesh mesh = box_tetrahedra(2, 2, 2);
+  tetrahedra::TetMesh mesh = box_tetrahedra(2, 2, 2);
   for (std::size_t t = 0; t < mesh.tetrahedra.size(); ++t)
     mesh.material.push_back(static_cast<std::int32_t>(t));
   for (std::size_t t = 0; t < mesh.tetrahedra.size(); t += 3) // inverted ones too
     std::swap(mesh.tetrahedra[t][0], mesh.tetrahedra[t][1]);
-  make_quadratic(mesh);
-  const TetBoundary surface = boundary(mesh);
+  tetrahedra::make_quadratic(mesh);
+  const tetrahedra::TetBoundary surface = tetrahedra::boundary(mesh);
   EXPECT_EQ(signed_volume(surface.mesh), 8);
   ASSERT_EQ(surface.middles.size(), surface.mesh.triangles.size());
   for (std::size_t f = 0; f < surface.middles.size(); ++f) {
@@ -148,13 +148,14 @@ TEST(TetBoundary, CarriesMaterialAndMiddles) {
 // ---- Quality
 
 TEST(TetQuality, OfKnownShapes) {
-  const TetQuality even = tet_quality(regular());
+  const tetrahedra::TetQuality even = tetrahedra::tet_quality(regular());
   EXPECT_NEAR(even.smallest_angle, 70.528779365509308, 1e-12);
   EXPECT_NEAR(even.largest_angle, 70.528779365509308, 1e-12);
   EXPECT_NEAR(even.radius_edge_ratio, std::sqrt(6.0) / 4, 1e-15);
   EXPECT_NEAR(even.volume, 8.0 / 3, 1e-15);
   EXPECT_EQ(even.angles.counts[7], 6U);
-  const TetQuality corner = tet_quality(one({0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}));
+  const tetrahedra::TetQuality corner =
+      tetrahedra::tet_quality(one({0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}));
   EXPECT_NEAR(corner.smallest_angle, 54.735610317245346, 1e-12);
   EXPECT_EQ(corner.largest_angle, 90);
   EXPECT_EQ(corner.angles.counts[5], 3U);
@@ -168,14 +169,16 @@ TEST(TetQuality, AnglesKeepTheirDigitsHoweverFlat) {
   for (const double height : {1e-3, 1e-8, 1e-15, 1e-100}) {
     // A flat pyramid over an equilateral triangle: at the base atan(height / inradius).
     const double s = std::sqrt(3.0) / 2;
-    const auto angles = dihedral_angles({1, 0, 0}, {-0.5, s, 0}, {-0.5, -s, 0}, {0, 0, height});
+    const auto angles =
+        tetrahedra::dihedral_angles({1, 0, 0}, {-0.5, s, 0}, {-0.5, -s, 0}, {0, 0, height});
     const double base = std::atan(height / 0.5);
     for (const std::size_t e : {0U, 1U, 2U})
       EXPECT_NEAR(angles[e] / base, 1, 1e-14) << height;
     for (const std::size_t e : {3U, 4U, 5U})
       EXPECT_GT(angles[e], 2.09);
     // A sliver: two edges of length 2 that cross at a distance of `height`.
-    const auto sliver = dihedral_angles({-1, 0, 0}, {1, 0, 0}, {0, -1, height}, {0, 1, height});
+    const auto sliver =
+        tetrahedra::dihedral_angles({-1, 0, 0}, {1, 0, 0}, {0, -1, height}, {0, 1, height});
     const double crossing = M_PI - 2 * std::atan(height);
     EXPECT_NEAR(sliver[0], crossing, 1e-15);
     EXPECT_NEAR(sliver[5], crossing, 1e-15);
@@ -186,10 +189,10 @@ TEST(TetQuality, AnglesKeepTheirDigitsHoweverFlat) {
 }
 
 TEST(TetQuality, OfABox) {
-  TetMesh mesh = box_tetrahedra(3, 3, 3, 2);
+  tetrahedra::TetMesh mesh = box_tetrahedra(3, 3, 3, 2);
   for (std::size_t t = 0; t < mesh.tetrahedra.size(); ++t)
     mesh.material.push_back(t < 6 ? 7 : 2);
-  const TetQuality linear = tet_quality(mesh);
+  const tetrahedra::TetQuality linear = tetrahedra::tet_quality(mesh);
   EXPECT_NEAR(linear.smallest_angle, 45, 1e-12);
   EXPECT_NEAR(linear.largest_angle, 90, 1e-12);
   EXPECT_NEAR(linear.volume, 216, 1e-11);
@@ -205,42 +208,43 @@ TEST(TetQuality, OfABox) {
   for (const std::uint64_t count : linear.angles.counts)
     angles += count;
   EXPECT_EQ(angles, 6U * 162);
-  make_quadratic(mesh);
-  const TetQuality quadratic = tet_quality(mesh);
+  tetrahedra::make_quadratic(mesh);
+  const tetrahedra::TetQuality quadratic = tetrahedra::tet_quality(mesh);
   // The middles of a box's edges are the nodes of a lattice twice as fine that are no corners.
   EXPECT_EQ(quadratic.surface_nodes, 343U - 125);
   EXPECT_EQ(quadratic.inner_nodes, 125U);
-  EXPECT_EQ(tet_quality(TetMesh{}).smallest_angle, 0);
+  EXPECT_EQ(tetrahedra::tet_quality(tetrahedra::TetMesh{}).smallest_angle, 0);
 }
 
 TEST(TetQuality, FlatAndInvertedOnesSayIt) {
-  const TetQuality flat = tet_quality(one({0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {1, 1, 0}));
+  const tetrahedra::TetQuality flat =
+      tetrahedra::tet_quality(one({0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {1, 1, 0}));
   EXPECT_EQ(flat.smallest_angle, 0);
   EXPECT_EQ(flat.largest_angle, 180);
   EXPECT_EQ(flat.radius_edge_ratio, HUGE_VAL);
-  TetMesh mesh = regular();
+  tetrahedra::TetMesh mesh = regular();
   std::swap(mesh.tetrahedra[0][1], mesh.tetrahedra[0][2]);
-  EXPECT_NEAR(tet_quality(mesh).smallest_volume, -8.0 / 3, 1e-15);
-  EXPECT_NEAR(tet_quality(mesh).smallest_angle, 70.528779365509308, 1e-12);
+  EXPECT_NEAR(tetrahedra::tet_quality(mesh).smallest_volume, -8.0 / 3, 1e-15);
+  EXPECT_NEAR(tetrahedra::tet_quality(mesh).smallest_angle, 70.528779365509308, 1e-12);
 }
 
 // ---- Findings
 
 TEST(TetCheck, ASoundMeshHasNone) {
   for (const bool quadratic : {false, true}) {
-    const TetMesh mesh = test::odd_tetrahedra(quadratic, true);
-    const TetReport report = examine_tetrahedra(mesh);
+    const tetrahedra::TetMesh mesh = test::odd_tetrahedra(quadratic, true);
+    const tetrahedra::TetReport report = tetrahedra::examine_tetrahedra(mesh);
     EXPECT_TRUE(report.sound() && report.manifold_boundary());
     EXPECT_EQ(report.unused_points.count + report.curved_edges.count, 0U);
     EXPECT_EQ(report.boundary_triangles, 2U * 2 * (2 + 3 + 6));
-    EXPECT_NEAR(report.volume, volume(mesh), 1e-12);
-    EXPECT_NO_THROW(require_sound(report));
+    EXPECT_NEAR(report.volume, tetrahedra::volume(mesh), 1e-12);
+    EXPECT_NO_THROW(tetrahedra::require_sound(report));
   }
 }
 
 TEST(TetCheck, EachFaultIsFoundAndNamed) {
-  const TetMesh sound = box_tetrahedra(2, 2, 2);
-  TetMesh mesh = sound;
+  const tetrahedra::TetMesh sound = box_tetrahedra(2, 2, 2);
+  tetrahedra::TetMesh mesh = sound;
   std::swap(mesh.tetrahedra[5][0], mesh.tetrahedra[5][1]);
   std::swap(mesh.tetrahedra[9][2], mesh.tetrahedra[9][3]);
   EXPECT_EQ(complaint(mesh), "2 inverted tetrahedra (first: tetrahedron 5), expected none");
@@ -248,8 +252,8 @@ TEST(TetCheck, EachFaultIsFoundAndNamed) {
   mesh = sound;
   mesh.tetrahedra.push_back({0, 1, 2, 2});
   mesh.tetrahedra.push_back({0, 1, 3, 4}); // in a plane
-  EXPECT_EQ(examine_tetrahedra(mesh).flat.count, 2U);
-  EXPECT_EQ(examine_tetrahedra(mesh).flat.first, 48U);
+  EXPECT_EQ(tetrahedra::examine_tetrahedra(mesh).flat.count, 2U);
+  EXPECT_EQ(tetrahedra::examine_tetrahedra(mesh).flat.first, 48U);
 
   mesh = sound;
   mesh.tetrahedra.push_back(
@@ -258,45 +262,45 @@ TEST(TetCheck, EachFaultIsFoundAndNamed) {
 
   mesh = sound;
   mesh.points.push_back({9, 9, 9});
-  EXPECT_EQ(examine_tetrahedra(mesh).unused_points.count, 1U);
-  EXPECT_EQ(examine_tetrahedra(mesh).unused_points.first, 27U);
+  EXPECT_EQ(tetrahedra::examine_tetrahedra(mesh).unused_points.count, 1U);
+  EXPECT_EQ(tetrahedra::examine_tetrahedra(mesh).unused_points.first, 27U);
   EXPECT_EQ(complaint(mesh), "");
 
   // A third tetrahedron at an inner face, with a corner of its own.
   mesh.tetrahedra.push_back(
       {mesh.tetrahedra[7][0], mesh.tetrahedra[7][1], mesh.tetrahedra[7][3], 27});
-  const TetReport crowded = examine_tetrahedra(mesh);
+  const tetrahedra::TetReport crowded = tetrahedra::examine_tetrahedra(mesh);
   EXPECT_EQ(crowded.crowded_faces.count, 1U);
   EXPECT_FALSE(crowded.sound());
 
-  EXPECT_EQ(complaint(TetMesh{}), "no tetrahedra, expected at least one");
+  EXPECT_EQ(complaint(tetrahedra::TetMesh{}), "no tetrahedra, expected at least one");
 }
 
 TEST(TetCheck, TwoOnOneSideOverlap) {
-  TetMesh mesh = one({0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1});
+  tetrahedra::TetMesh mesh = one({0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1});
   mesh.points.push_back({0.2, 0.2, 2});
   mesh.tetrahedra.push_back({0, 1, 2, 4});
   EXPECT_EQ(complaint(mesh),
             "1 faces with both tetrahedra on one side (first: at tetrahedron 0), expected none");
   // An inverted one lies where it lies.
   mesh.tetrahedra[1] = {1, 0, 2, 4};
-  EXPECT_EQ(examine_tetrahedra(mesh).overlapping_faces.count, 1U);
+  EXPECT_EQ(tetrahedra::examine_tetrahedra(mesh).overlapping_faces.count, 1U);
   mesh.points[4].z = -2;
-  EXPECT_EQ(examine_tetrahedra(mesh).overlapping_faces.count, 0U);
-  EXPECT_EQ(examine_tetrahedra(mesh).inverted.count, 0U);
+  EXPECT_EQ(tetrahedra::examine_tetrahedra(mesh).overlapping_faces.count, 0U);
+  EXPECT_EQ(tetrahedra::examine_tetrahedra(mesh).inverted.count, 0U);
 }
 
 TEST(TetCheck, WhereTheBoundaryTouchesItself) {
   // Two tetrahedra with one edge in common, and two with one point.
-  TetMesh mesh = one({0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1});
+  tetrahedra::TetMesh mesh = one({0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1});
   mesh.points.insert(mesh.points.end(), {{1, -1, -1}, {0, -1, -2}, {-2, -1, 0}});
   mesh.tetrahedra.push_back({0, 1, 4, 5});
-  TetReport report = examine_tetrahedra(mesh);
+  tetrahedra::TetReport report = tetrahedra::examine_tetrahedra(mesh);
   EXPECT_EQ(report.nonmanifold_edges.count, 1U);
   EXPECT_EQ(report.nonmanifold_edges.first, 0U);
   EXPECT_EQ(report.boundary_triangles, 8U);
   mesh.tetrahedra.back() = {0, 4, 5, 6};
-  report = examine_tetrahedra(mesh);
+  report = tetrahedra::examine_tetrahedra(mesh);
   EXPECT_EQ(report.nonmanifold_edges.count, 0U);
   EXPECT_EQ(report.nonmanifold_points.count, 1U);
   EXPECT_EQ(report.nonmanifold_points.first, 0U);
@@ -304,16 +308,16 @@ TEST(TetCheck, WhereTheBoundaryTouchesItself) {
 }
 
 TEST(TetCheck, MiddlesOfEdges) {
-  TetMesh sound = box_tetrahedra(1, 1, 1);
-  make_quadratic(sound);
+  tetrahedra::TetMesh sound = box_tetrahedra(1, 1, 1);
+  tetrahedra::make_quadratic(sound);
   EXPECT_EQ(complaint(sound), "");
   // The diagonal of the cube lies in all six tetrahedra.
   const std::uint32_t middle = sound.middles[0][3];
-  TetMesh mesh = sound;
+  tetrahedra::TetMesh mesh = sound;
   mesh.points[middle].x += 1e-6;
-  EXPECT_EQ(examine_tetrahedra(mesh).curved_edges.count, 0U);
+  EXPECT_EQ(tetrahedra::examine_tetrahedra(mesh).curved_edges.count, 0U);
   mesh.points[middle].x += 1e-2;
-  EXPECT_EQ(examine_tetrahedra(mesh).curved_edges.count, 1U);
+  EXPECT_EQ(tetrahedra::examine_tetrahedra(mesh).curved_edges.count, 1U);
   EXPECT_EQ(complaint(mesh), "");
 
   mesh = sound;
@@ -324,15 +328,15 @@ TEST(TetCheck, MiddlesOfEdges) {
 
   mesh = sound;
   mesh.middles[0][0] = mesh.tetrahedra[0][2];
-  EXPECT_EQ(examine_tetrahedra(mesh).reused_middles.count, 1U);
-  EXPECT_EQ(examine_tetrahedra(mesh).reused_middles.first, mesh.tetrahedra[0][2]);
+  EXPECT_EQ(tetrahedra::examine_tetrahedra(mesh).reused_middles.count, 1U);
+  EXPECT_EQ(tetrahedra::examine_tetrahedra(mesh).reused_middles.first, mesh.tetrahedra[0][2]);
 }
 
 TEST(TetCheck, RandomOnesAsPlainCodeSays) {
   std::mt19937 random(3);
   for (int round = 0; round < 80; ++round) {
-    const TetMesh mesh = random_mesh(random, 1 + random() % 60, 5 + draw(random, 12));
-    const TetReport report = examine_tetrahedra(mesh);
+    const tetrahedra::TetMesh mesh = random_mesh(random, 1 + random() % 60, 5 + draw(random, 12));
+    const tetrahedra::TetReport report = tetrahedra::examine_tetrahedra(mesh);
     std::uint64_t flat = 0, inverted = 0, duplicates = 0, crowded = 0, overlapping = 0;
     std::set<std::set<std::uint32_t>> seen;
     std::map<std::set<std::uint32_t>, std::vector<std::uint32_t>> tips;
@@ -359,8 +363,8 @@ TEST(TetCheck, RandomOnesAsPlainCodeSays) {
       crowded += at.size() > 2;
       const std::vector<std::uint32_t> f(face.begin(), face.end());
       const auto side = [&](std::uint32_t tip) {
-        return tetrahedron_volume(mesh.points[f[0]], mesh.points[f[1]], mesh.points[f[2]],
-                                  mesh.points[tip]);
+        return tetrahedra::tetrahedron_volume(mesh.points[f[0]], mesh.points[f[1]],
+                                              mesh.points[f[2]], mesh.points[tip]);
       };
       overlapping += at.size() == 2 && side(at[0]) * side(at[1]) > 0;
     }
@@ -377,8 +381,8 @@ TEST(TetCheck, RandomOnesAsPlainCodeSays) {
 
 TEST(TetRepair, TurnsAndDropsWhatWasPlanted) {
   for (const bool quadratic : {false, true}) {
-    const TetMesh sound = test::odd_tetrahedra(quadratic, true);
-    TetMesh mesh = sound;
+    const tetrahedra::TetMesh sound = test::odd_tetrahedra(quadratic, true);
+    tetrahedra::TetMesh mesh = sound;
     std::mt19937 random(5);
     std::uint64_t turned = 0;
     for (std::size_t t = 0; t < mesh.tetrahedra.size(); ++t)
@@ -398,7 +402,7 @@ TEST(TetRepair, TurnsAndDropsWhatWasPlanted) {
     mesh.material.insert(mesh.material.end(), {1, 1});
     if (quadratic)
       mesh.middles.insert(mesh.middles.end(), {mesh.middles[4], {0, 0, 0, 0, 0, 0}});
-    const TetRepair done = repair_tetrahedra(mesh);
+    const tetrahedra::TetRepair done = tetrahedra::repair_tetrahedra(mesh);
     EXPECT_EQ(done.turned, turned);
     EXPECT_EQ(done.dropped_flat, 1U);
     EXPECT_EQ(done.dropped_duplicates, 1U);
@@ -409,15 +413,15 @@ TEST(TetRepair, TurnsAndDropsWhatWasPlanted) {
 }
 
 TEST(TetRepair, DoesWhatIsAskedForAlone) {
-  TetMesh mesh = regular();
+  tetrahedra::TetMesh mesh = regular();
   mesh.tetrahedra.push_back(mesh.tetrahedra[0]);
   std::swap(mesh.tetrahedra[0][0], mesh.tetrahedra[0][1]);
   mesh.points.insert(mesh.points.end(), {{0, 0, 0}, {1, 0, 0}, {2, 0, 0}, {3, 1, 0}});
   mesh.tetrahedra.push_back({4, 5, 6, 7});
-  const auto left = [&](TetRepairOptions options) {
-    TetMesh copy = mesh;
-    (void)repair_tetrahedra(copy, options);
-    const TetReport found = examine_tetrahedra(copy);
+  const auto left = [&](tetrahedra::TetRepairOptions options) {
+    tetrahedra::TetMesh copy = mesh;
+    (void)tetrahedra::repair_tetrahedra(copy, options);
+    const tetrahedra::TetReport found = tetrahedra::examine_tetrahedra(copy);
     return std::array{found.inverted.count, found.flat.count, found.duplicates.count};
   };
   EXPECT_EQ(left({true, false, false}), (std::array<std::uint64_t, 3>{0, 1, 1}));
@@ -426,32 +430,32 @@ TEST(TetRepair, DoesWhatIsAskedForAlone) {
 }
 
 TEST(TetRepair, PutsMiddlesWhereTheirEdgesAre) {
-  TetMesh mesh = regular();
-  make_quadratic(mesh);
+  tetrahedra::TetMesh mesh = regular();
+  tetrahedra::make_quadratic(mesh);
   std::swap(mesh.points[0], mesh.points[1]);
   std::swap(mesh.points[5], mesh.points[6]);
   std::swap(mesh.points[7], mesh.points[8]);
-  ASSERT_LT(volume(mesh), 0);
-  EXPECT_EQ(repair_tetrahedra(mesh).turned, 1U);
-  EXPECT_GT(volume(mesh), 0);
-  EXPECT_EQ(examine_tetrahedra(mesh).curved_edges.count, 0U);
+  ASSERT_LT(tetrahedra::volume(mesh), 0);
+  EXPECT_EQ(tetrahedra::repair_tetrahedra(mesh).turned, 1U);
+  EXPECT_GT(tetrahedra::volume(mesh), 0);
+  EXPECT_EQ(tetrahedra::examine_tetrahedra(mesh).curved_edges.count, 0U);
 }
 
 // ---- Order
 
 TEST(TetOrder, GroupsFollowOneAnother) {
-  TetMesh mesh = box_tetrahedra(3, 3, 3);
+  tetrahedra::TetMesh mesh = box_tetrahedra(3, 3, 3);
   mesh.points.insert(mesh.points.begin(), {-1, -1, -1}); // unused
   for (Tetrahedron& t : mesh.tetrahedra)
     for (std::uint32_t& corner : t)
       ++corner;
-  make_quadratic(mesh);
+  tetrahedra::make_quadratic(mesh);
   std::mt19937 random(7);
   std::vector<std::uint32_t> mix(mesh.points.size());
   for (std::uint32_t p = 0; p < mix.size(); ++p)
     mix[p] = p;
   std::shuffle(mix.begin(), mix.end(), random);
-  TetMesh mixed = mesh;
+  tetrahedra::TetMesh mixed = mesh;
   for (std::size_t p = 0; p < mix.size(); ++p)
     mixed.points[mix[p]] = mesh.points[p];
   for (Tetrahedron& t : mixed.tetrahedra)
@@ -460,8 +464,8 @@ TEST(TetOrder, GroupsFollowOneAnother) {
   for (EdgeMiddles& m : mixed.middles)
     for (std::uint32_t& node : m)
       node = mix[node];
-  TetMesh ordered = mixed;
-  const NodeOrder order = order_nodes(ordered);
+  tetrahedra::TetMesh ordered = mixed;
+  const tetrahedra::NodeOrder order = tetrahedra::order_nodes(ordered);
   EXPECT_EQ(order.surface_corners, 56U);
   EXPECT_EQ(order.surface_middles, 343U - 125 - 56);
   EXPECT_EQ(order.surface(), 343U - 125);
@@ -496,31 +500,31 @@ TEST(TetOrder, GroupsFollowOneAnother) {
       EXPECT_EQ(ordered.middles[t][k], order.number[mixed.middles[t][k]]);
   }
   // Twice is once.
-  TetMesh again = ordered;
-  order_nodes(again);
+  tetrahedra::TetMesh again = ordered;
+  tetrahedra::order_nodes(again);
   EXPECT_TRUE(same_bytes(again, ordered));
 }
 
 TEST(TetOrder, QuadraticNodesAreSharedAndNumberedByFirstUse) {
-  const TetMesh linear = box_tetrahedra(2, 3, 2);
-  TetMesh mesh = linear;
-  make_quadratic(mesh);
-  EXPECT_NO_THROW(check_mesh(mesh));
+  const tetrahedra::TetMesh linear = box_tetrahedra(2, 3, 2);
+  tetrahedra::TetMesh mesh = linear;
+  tetrahedra::make_quadratic(mesh);
+  EXPECT_NO_THROW(tetrahedra::check_mesh(mesh));
   std::map<std::pair<std::uint32_t, std::uint32_t>, std::uint32_t> middle;
   for (std::size_t t = 0; t < mesh.tetrahedra.size(); ++t)
     for (std::size_t k = 0; k < 6; ++k) {
-      const std::uint32_t a = mesh.tetrahedra[t][tetrahedron_edges[k][0]];
-      const std::uint32_t b = mesh.tetrahedra[t][tetrahedron_edges[k][1]];
+      const std::uint32_t a = mesh.tetrahedra[t][tetrahedra::tetrahedron_edges[k][0]];
+      const std::uint32_t b = mesh.tetrahedra[t][tetrahedra::tetrahedron_edges[k][1]];
       const auto next = static_cast<std::uint32_t>(linear.points.size() + middle.size());
       EXPECT_EQ(mesh.middles[t][k], middle.try_emplace(std::minmax(a, b), next).first->second);
       EXPECT_EQ(mesh.points[mesh.middles[t][k]], (mesh.points[a] + mesh.points[b]) * 0.5);
     }
   EXPECT_EQ(mesh.points.size(), linear.points.size() + middle.size());
-  EXPECT_THROW(make_quadratic(mesh), Error);
-  TetMesh flat = linear;
+  EXPECT_THROW(tetrahedra::make_quadratic(mesh), Error);
+  tetrahedra::TetMesh flat = linear;
   flat.tetrahedra[3][1] = flat.tetrahedra[3][0];
-  EXPECT_THROW(make_quadratic(flat), Error);
+  EXPECT_THROW(tetrahedra::make_quadratic(flat), Error);
 }
 
 } // namespace
-} // namespace gewebe
+} // namespace gewebe::test

@@ -8,7 +8,7 @@
 
 #include <string>
 
-namespace gewebe {
+namespace gewebe::test {
 namespace {
 
 using namespace test;
@@ -22,9 +22,9 @@ struct Kinds {
 
 class PressedBalls : public testing::TestWithParam<Kinds> {};
 
-Model body(const TriangleMesh& surface, bool solid) {
-  const Model inner = solid_of(stuffed(surface, cells));
-  return solid ? inner : net_of(surface_mesh(inner));
+model::Model body(const TriangleMesh& surface, bool solid) {
+  const model::Model inner = solid_of(stuffed(surface, cells));
+  return solid ? inner : net_of(model::surface_mesh(inner));
 }
 
 void expect_fair(const Rest& rest, double force) {
@@ -38,8 +38,8 @@ void expect_fair(const Rest& rest, double force) {
 
 TEST_P(PressedBalls, RestOnEachOther) {
   const Kinds kinds = GetParam();
-  const Model below = body(sphere_mesh(3, tall / 2, {}), kinds.below),
-              above = body(sphere_mesh(3, tall / 2, {1.7, 0.9, tall + 1}), kinds.above);
+  const model::Model below = body(sphere_mesh(3, tall / 2, {}), kinds.below),
+                     above = body(sphere_mesh(3, tall / 2, {1.7, 0.9, tall + 1}), kinds.above);
   Press press;
   press.force = kinds.force;
   press.friction = 0.3;
@@ -47,8 +47,8 @@ TEST_P(PressedBalls, RestOnEachOther) {
 }
 
 TEST(Touch, BallsPassEachOtherWhereNobodySaysOtherwise) {
-  const Model below = body(sphere_mesh(3, tall / 2, {}), true),
-              above = body(sphere_mesh(3, tall / 2, {1.7, 0.9, tall + 1}), true);
+  const model::Model below = body(sphere_mesh(3, tall / 2, {}), true),
+                     above = body(sphere_mesh(3, tall / 2, {1.7, 0.9, tall + 1}), true);
   Press press;
   press.meet = false;
   press.longest = 0.1;
@@ -66,11 +66,11 @@ TEST(Touch, ALiverRestsOnASpleen) {
                      liver = load_test_mesh("sofa_liver_smooth.obj");
   if (spleen.triangles.empty() || liver.triangles.empty())
     GTEST_SKIP() << "needs data/hubmap_F_spleen_uv.obj and data/sofa_liver_smooth.obj";
-  const Model below = solid_of(stuffed(placed(spleen, tall, {}), 6));
+  const model::Model below = solid_of(stuffed(placed(spleen, tall, {}), 6));
   Box3 box;
-  for (const Node& n : below.nodes)
+  for (const model::Node& n : below.nodes)
     box.add(n.position);
-  const Model above = solid_of(stuffed(placed(liver, tall, {1.7, 0.9, box.max.z + 1}), 6));
+  const model::Model above = solid_of(stuffed(placed(liver, tall, {1.7, 0.9, box.max.z + 1}), 6));
   for (const bool still : {false, true}) {
     Press press;
     press.force = 5e5;
@@ -82,7 +82,7 @@ TEST(Touch, ALiverRestsOnASpleen) {
 TEST(Touch, AFoldedTubeTouchesItself) {
   const double radius = 8, apart = 22;
   const TriangleMesh tube = tube_round(hairpin(40, apart, 8.4), 6, radius);
-  const Model model = solid_of(stuffed(tube, 9));
+  const model::Model model = solid_of(stuffed(tube, 9));
   for (const bool meets : {true, false}) {
     Press press;
     press.force = 5e5;
@@ -101,4 +101,4 @@ TEST(Touch, AFoldedTubeTouchesItself) {
 }
 
 } // namespace
-} // namespace gewebe
+} // namespace gewebe::test

@@ -12,7 +12,7 @@
 #include <cmath>
 #include <string>
 
-namespace gewebe {
+namespace gewebe::test {
 namespace {
 
 std::string complaint(const std::string& text) {
@@ -89,7 +89,7 @@ TEST(Transform, AMirroredSurfaceKeepsItsOutside) {
   mesh.texcoords = {{1, 2, 3, 4, 5, 6}, {}, {}, {}};
   ASSERT_GT(signed_volume(mesh), 0);
   TriangleMesh moved = mesh;
-  apply(parse_affine("mirror x; scale 2; translate 9 9 9"), moved);
+  cli::apply(parse_affine("mirror x; scale 2; translate 9 9 9"), moved);
   EXPECT_NEAR(signed_volume(moved), 8 * signed_volume(mesh), 1e-9);
   EXPECT_EQ(moved.triangles[0], (Triangle{0, 1, 2}));
   EXPECT_EQ(moved.texcoords[0][2], 5);
@@ -97,26 +97,27 @@ TEST(Transform, AMirroredSurfaceKeepsItsOutside) {
   EXPECT_NEAR(moved.normals[0][0], 0.6F, 1e-6);
   EXPECT_NEAR(moved.normals[0][1], -0.8F, 1e-6);
   // Normals of a stretched surface stay across it.
-  apply(parse_affine("scale 4 1 1"), mesh);
+  cli::apply(parse_affine("scale 4 1 1"), mesh);
   EXPECT_NEAR(mesh.normals[0][0] / mesh.normals[0][1], 0.6 / 4 / 0.8, 1e-6);
-  EXPECT_THROW(apply(parse_affine("scale 1e308"), mesh), Error);
+  EXPECT_THROW(cli::apply(parse_affine("scale 1e308"), mesh), Error);
 }
 
 TEST(Transform, MirroredTetrahedraKeepTheirMiddles) {
-  TetMesh mesh;
+  tetrahedra::TetMesh mesh;
   mesh.points = {{0, 0, 0}, {1, 0, 0}, {0, 2, 0}, {0, 0, 3}};
   mesh.tetrahedra = {{0, 1, 2, 3}};
   EdgeMiddles middles{};
   for (std::size_t e = 0; e < 6; ++e) {
     middles[e] = static_cast<std::uint32_t>(mesh.points.size());
-    mesh.points.push_back(
-        (mesh.points[tetrahedron_edges[e][0]] + mesh.points[tetrahedron_edges[e][1]]) / 2);
+    mesh.points.push_back((mesh.points[tetrahedra::tetrahedron_edges[e][0]] +
+                           mesh.points[tetrahedra::tetrahedron_edges[e][1]]) /
+                          2);
   }
   mesh.middles = {middles};
-  apply(parse_affine("mirror z; rotate y 20"), mesh);
-  EXPECT_NEAR(volume(mesh), 1, 1e-12);
+  cli::apply(parse_affine("mirror z; rotate y 20"), mesh);
+  EXPECT_NEAR(tetrahedra::volume(mesh), 1, 1e-12);
   for (std::size_t e = 0; e < 6; ++e) {
-    const auto& [a, b] = tetrahedron_edges[e];
+    const auto& [a, b] = tetrahedra::tetrahedron_edges[e];
     expect_near(mesh.points[mesh.middles[0][e]],
                 (mesh.points[mesh.tetrahedra[0][a]] + mesh.points[mesh.tetrahedra[0][b]]) / 2);
   }
@@ -130,27 +131,27 @@ constexpr const char* triangle =
 
 TEST(Transform, ModelsTurnWithTheirAxes) {
   Space space = Space::unknown;
-  const Model model = parse_ela(triangle, "M", {}, &space);
+  const model::Model model = formats::parse_ela(triangle, "M", {}, &space);
   EXPECT_EQ(space, Space::lps);
-  Model turned = model;
-  apply(parse_affine("rotate z 90; translate 5 0 0"), turned);
+  model::Model turned = model;
+  cli::apply(parse_affine("rotate z 90; translate 5 0 0"), turned);
   EXPECT_EQ(turned.nodes[1].position, (Vec3{5, 1, 0}));
   EXPECT_EQ(turned.nodes[0].fixed, 2); // along y
   EXPECT_EQ(turned.nodes[2].fixed, 7);
-  EXPECT_THROW(apply(parse_affine("rotate z 45"), turned), Error);
-  EXPECT_THROW(apply(parse_affine("scale 2"), turned), Error);
+  EXPECT_THROW(cli::apply(parse_affine("rotate z 45"), turned), Error);
+  EXPECT_THROW(cli::apply(parse_affine("scale 2"), turned), Error);
 }
 
 TEST(Transform, SpacesOfModels) {
   Space space = Space::ras;
   std::string text = triangle;
   text.erase(text.find("space"), 10);
-  (void)parse_ela(text, "M", {}, &space);
+  (void)formats::parse_ela(text, "M", {}, &space);
   EXPECT_EQ(space, Space::unknown);
   text = triangle;
   text.replace(text.find("LPS"), 3, "LAS");
   try {
-    (void)parse_ela(text, "M");
+    (void)formats::parse_ela(text, "M");
     ADD_FAILURE();
   } catch (const Error& error) {
     EXPECT_EQ(error.place() + ": " + error.what(), "M:3: 'LAS' is no space, expected RAS or LPS");
@@ -158,4 +159,4 @@ TEST(Transform, SpacesOfModels) {
 }
 
 } // namespace
-} // namespace gewebe
+} // namespace gewebe::test

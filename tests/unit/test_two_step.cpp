@@ -17,50 +17,51 @@
 #include <string>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::test {
 namespace {
 
 using test::free_nodes, test::organ;
 
 /// Every spring stiffer by a factor of its own between `from` and `to`.
-Model stiffened(Model model, double from, double to) {
+model::Model stiffened(model::Model model, double from, double to) {
   std::mt19937 engine(7);
-  for (Spring& s : model.springs)
+  for (model::Spring& s : model.springs)
     s.stiffness *= from + (to - from) * static_cast<double>(engine()) / 4294967296.0;
   return model;
 }
 
-std::shared_ptr<ComplianceSource> compliance_of(const Model& model) {
-  return compliance_of_factor([&model] { return Factor(stiffness_matrix(model), Context{}); });
+std::shared_ptr<compliance::ComplianceSource> compliance_of(const model::Model& model) {
+  return compliance::compliance_of_factor(
+      [&model] { return linalg::Factor(fem::stiffness_matrix(model), Context{}); });
 }
 
 struct Stages {
-  Model model, stiff;
-  Elastostatic first;
-  TwoStep two;
+  model::Model model, stiff;
+  statics::Elastostatic first;
+  statics::TwoStep two;
 
-  Stages(Model one, Model other, const TwoStepOptions& options)
+  Stages(model::Model one, model::Model other, const statics::TwoStepOptions& options)
       : model(std::move(one)), stiff(std::move(other)), first(model, {}, Context{}),
         two(model, compliance_of(stiff), Context{}, options) {}
   Stages(const Stages&) = delete;
   Stages& operator=(const Stages&) = delete;
 
-  std::vector<double> shape(const Load& load) {
+  std::vector<double> shape(const contact::Load& load) {
     two.update(first, load);
     const std::span<const double> u = two.displacement(first);
     return {u.begin(), u.end()};
   }
 };
 
-std::vector<double> compliance_times(const Model& model, const Load& load) {
-  Elastostatic object(model, {}, Context{});
+std::vector<double> compliance_times(const model::Model& model, const contact::Load& load) {
+  statics::Elastostatic object(model, {}, Context{});
   object.update(load);
   const std::span<const double> u = object.displacement();
   return {u.begin(), u.end()};
 }
 
-Load times(double factor, const Load& load) {
-  Load more = load;
+contact::Load times(double factor, const contact::Load& load) {
+  contact::Load more = load;
   for (auto& [node, force] : more.force)
     force *= factor;
   more.gravity *= factor;
@@ -76,13 +77,13 @@ std::vector<double> combined(double a, const std::vector<double>& x, double b,
 }
 
 /// Forces on some nodes and weight, together of norm 1.
-Load unit_load(const Model& model) {
-  Load load{.gravity = {0, 100, -981}};
+contact::Load unit_load(const model::Model& model) {
+  contact::Load load{.gravity = {0, 100, -981}};
   const std::vector<std::uint32_t> nodes = free_nodes(model);
   for (std::size_t k = 0; k < 5; ++k)
     load.force[nodes[7 * k]] = {std::sin(1.0 + static_cast<double>(k)), 0.3, -0.2};
   load.force[nodes[3]] = {0, 2, 0};
-  return times(1 / load_norm(model, load), load);
+  return times(1 / statics::load_norm(model, load), load);
 }
 
 Vec3 at(const std::vector<double>& u, std::size_t node) {
@@ -90,34 +91,34 @@ Vec3 at(const std::vector<double>& u, std::size_t node) {
 }
 
 TEST(TwoStep, LoadNormCountsForcesAndWeightOfFreeAxes) {
-  Model model = test::two_masses(2);
-  model.nodes[0].fixed = fixed_all;
-  model.nodes[1].fixed = fixed_y;
-  Load load;
+  model::Model model = test::two_masses(2);
+  model.nodes[0].fixed = model::fixed_all;
+  model.nodes[1].fixed = model::fixed_y;
+  contact::Load load;
   load.force[0] = {100, 100, 100};
   load.force[1] = {1, 50, -2};
-  EXPECT_DOUBLE_EQ(load_norm(model, load), std::sqrt(5.0));
+  EXPECT_DOUBLE_EQ(statics::load_norm(model, load), std::sqrt(5.0));
   load.gravity = {1, 7, 3};
-  EXPECT_DOUBLE_EQ(load_norm(model, load), 5); // (1 + 2, -, -2 + 6)
+  EXPECT_DOUBLE_EQ(statics::load_norm(model, load), 5); // (1 + 2, -, -2 + 6)
 }
 
 // One spring: u = f/k up to f0, then the line of slope 1/k1 - 1/k2, or 1/k2 in series.
 TEST(TwoStep, OneSpringFollowsFigure3_10) {
   for (const bool series : {false, true}) {
-    Model soft = test::two_masses();
-    soft.nodes[0].fixed = fixed_all;
-    soft.nodes[1].fixed = fixed_y | fixed_z;
-    Model stiff = soft;
+    model::Model soft = test::two_masses();
+    soft.nodes[0].fixed = model::fixed_all;
+    soft.nodes[1].fixed = model::fixed_y | model::fixed_z;
+    model::Model stiff = soft;
     stiff.springs[0].stiffness = 4;
     Stages s(soft, stiff, {.threshold = 2, .series = series});
     const double slope = series ? 0.25 : 0.75;
     for (const double f : {0.0, 0.5, 1.0, 2.0, 2.5, 4.0, 100.0, -1.0, -3.0}) {
       const double size = std::abs(f);
       const double u = std::copysign(std::min(size, 2.0) + slope * std::max(0.0, size - 2), f);
-      Load pull;
+      contact::Load pull;
       pull.force[1] = {f, 0, 0};
       EXPECT_NEAR(s.shape(pull)[3], u, 1e-14 * size) << f;
-      Load hold;
+      contact::Load hold;
       hold.displacement[1] = {u, 0, 0};
       EXPECT_EQ(s.shape(hold)[3], u);
       ASSERT_EQ(s.two.contact_forces().size(), 1U);
@@ -129,8 +130,8 @@ TEST(TwoStep, OneSpringFollowsFigure3_10) {
 }
 
 TEST(TwoStep, IsContinuousAndHasTheSlopesOfItsStages) {
-  const Model model = organ(), stiff = stiffened(model, 3, 6);
-  const Load unit = unit_load(model);
+  const model::Model model = organ(), stiff = stiffened(model, 3, 6);
+  const contact::Load unit = unit_load(model);
   const double f0 = 50;
   const std::vector<double> c1 = compliance_times(model, unit), c2 = compliance_times(stiff, unit);
   for (const bool series : {false, true}) {
@@ -157,16 +158,16 @@ TEST(TwoStep, IsContinuousAndHasTheSlopesOfItsStages) {
 }
 
 TEST(TwoStep, DisplacementGivesBackThePointOfTheCurve) {
-  const Model model = organ(), stiff = stiffened(model, 2, 5);
-  const Load unit = unit_load(model);
+  const model::Model model = organ(), stiff = stiffened(model, 2, 5);
+  const contact::Load unit = unit_load(model);
   const double f0 = 50;
   for (const bool series : {false, true})
     for (const double size : {0.3, 0.999, 1.0, 1.001, 1.5, 4.0, 30.0, 1e4}) {
       Stages s(model, stiff, {.threshold = f0, .series = series});
-      const Load given = times(size * f0, unit);
+      const contact::Load given = times(size * f0, unit);
       const std::vector<double> u = s.shape(given);
       // The same with some of the nodes held where they are, the rest of the load as it was.
-      Load held = given;
+      contact::Load held = given;
       std::map<std::uint32_t, Vec3> force;
       int k = 0;
       for (const auto& [node, f] : given.force)
@@ -183,13 +184,13 @@ TEST(TwoStep, DisplacementGivesBackThePointOfTheCurve) {
       EXPECT_NEAR(s.two.load(), size * f0, 1e-10 * size * f0);
       double error = 0;
       ASSERT_EQ(s.two.contact_forces().size(), force.size());
-      for (const NodeVector& f : s.two.contact_forces()) {
+      for (const contact::NodeVector& f : s.two.contact_forces()) {
         error = test::larger(error, norm(f.value - force.at(f.node)));
         EXPECT_EQ(at(again, f.node), held.displacement.at(f.node));
       }
       EXPECT_LT(error, 1e-10 * size * f0) << series << " " << size;
       // From a cached contact too, and back below the threshold.
-      Load nearer = held;
+      contact::Load nearer = held;
       for (auto& [node, d] : nearer.displacement)
         d *= 1.001;
       EXPECT_GT(test::relative_difference(s.shape(nearer), u), 1e-5);
@@ -200,36 +201,37 @@ TEST(TwoStep, DisplacementGivesBackThePointOfTheCurve) {
 }
 
 TEST(TwoStep, HalfHeldNodesAreGraspedAlongTheirFreeAxes) {
-  const Model model = organ(), stiff = stiffened(model, 2, 5);
+  const model::Model model = organ(), stiff = stiffened(model, 2, 5);
   std::uint32_t half = 0, whole = 0;
-  for (std::uint32_t i = 0; i < surface_count(model); ++i)
-    (model.nodes[i].fixed == fixed_z     ? half
-     : model.nodes[i].fixed == fixed_all ? whole
-                                         : half) = model.nodes[i].fixed == fixed_none ? half : i;
-  ASSERT_EQ(model.nodes[half].fixed, fixed_z);
-  ASSERT_EQ(model.nodes[whole].fixed, fixed_all);
+  for (std::uint32_t i = 0; i < model::surface_count(model); ++i)
+    (model.nodes[i].fixed == model::fixed_z     ? half
+     : model.nodes[i].fixed == model::fixed_all ? whole
+                                                : half) =
+        model.nodes[i].fixed == model::fixed_none ? half : i;
+  ASSERT_EQ(model.nodes[half].fixed, model::fixed_z);
+  ASSERT_EQ(model.nodes[whole].fixed, model::fixed_all);
   Stages s(model, stiff, {.threshold = 1});
-  Load load;
+  contact::Load load;
   load.force[half] = {30, -40, 99};
   const std::vector<double> u = s.shape(load);
   EXPECT_DOUBLE_EQ(s.two.load(), 50);
-  Load held;
+  contact::Load held;
   held.displacement[half] = {at(u, half).x, at(u, half).y, 0};
   held.displacement[whole] = {};
   EXPECT_LT(test::relative_difference(s.shape(held), u), 1e-11);
-  for (const NodeVector& f : s.two.contact_forces())
+  for (const contact::NodeVector& f : s.two.contact_forces())
     EXPECT_LT(norm(f.value - (f.node == half ? Vec3{30, -40, 0} : Vec3{})), 1e-9);
   // Nothing but what can't move: no force, no threshold.
-  Load nothing;
+  contact::Load nothing;
   nothing.displacement[whole] = {};
   EXPECT_EQ(s.shape(nothing), std::vector<double>(u.size(), 0.0));
 }
 
 TEST(TwoStep, RefusesAStageThatIsNotStiffer) {
-  const Model model = organ();
-  const Model mixed = stiffened(model, 0.2, 3);
+  const model::Model model = organ();
+  const model::Model mixed = stiffened(model, 0.2, 3);
   const std::uint32_t node = free_nodes(model)[4];
-  Load hold;
+  contact::Load hold;
   hold.displacement[node] = {0, 0, 1};
   Stages s(model, mixed, {.threshold = 1e-3});
   std::string message;
@@ -246,7 +248,7 @@ TEST(TwoStep, RefusesAStageThatIsNotStiffer) {
   s.two.set({.threshold = 1e-3, .series = true});
   const std::vector<double> u = s.shape(hold);
   EXPECT_EQ(at(u, node).z, 1);
-  Load pull;
+  contact::Load pull;
   pull.force[node] = s.two.contact_forces()[0].value;
   EXPECT_LT(test::relative_difference(s.shape(pull), u), 1e-10);
   for (const double bad : {0.0, -1.0, std::nan(""), HUGE_VAL})
@@ -257,10 +259,10 @@ TEST(TwoStep, RootIsFoundFarBeyondTheThreshold) {
   // Two blocks that share no eigenvectors, pulled along a poor direction.
   const std::vector<double> a1{4, 1, 1, 3}, a2{1.5, 0.9, 0.9, 1};
   for (const bool series : {false, true}) {
-    const TwoStepContact contact(a1, a2, 2, series);
+    const statics::TwoStepContact contact(a1, a2, 2, series);
     for (const double far : {1.0, 1e2, 1e6, 1e12}) {
       const std::vector<double> d{far, -far}, none{0, 0};
-      const TwoStepContact::Answer answer = contact.solve({d, none, none, none, 0, 1});
+      const statics::TwoStepContact::Answer answer = contact.solve({d, none, none, none, 0, 1});
       const double f = std::hypot(answer.force[0], answer.force[1]);
       const double s = std::min(1.0, 1 / f);
       EXPECT_NEAR(answer.s, s, 1e-15);
@@ -276,21 +278,21 @@ TEST(TwoStep, RootIsFoundFarBeyondTheThreshold) {
 /// An organ pressed from above by a sphere, one of its nodes displaced.
 struct Pressed {
   std::vector<double> u;
-  std::vector<NodeVector> forces;
+  std::vector<contact::NodeVector> forces;
   Vec3 tool;
 };
-Pressed pressed(const Model& model, const Model& stiff, std::optional<TwoStepOptions> options,
-                double friction, bool displaced) {
-  Simulation s(test::one_thread(),
-               {.warn = [](const std::string& text) { ADD_FAILURE() << text; }});
-  s.add_object("o", model, Method::ffe);
+Pressed pressed(const model::Model& model, const model::Model& stiff,
+                std::optional<statics::TwoStepOptions> options, double friction, bool displaced) {
+  scene::Simulation s(test::one_thread(),
+                      {.warn = [](const std::string& text) { ADD_FAILURE() << text; }});
+  s.add_object("o", model, scene::Method::ffe);
   if (options)
-    s.apply(SetTwoStep{0, *options, [&] { return compliance_of(stiff); }});
+    s.apply(scene::SetTwoStep{0, *options, [&] { return compliance_of(stiff); }});
   if (displaced)
-    s.apply(SetDisplacement{0, {free_nodes(model)[2]}, {0.01, 0.02, 0}});
+    s.apply(scene::SetDisplacement{0, {free_nodes(model)[2]}, {0.01, 0.02, 0}});
   const Vec3 start{100.3, -49.8, 58};
-  s.apply(SetInstrument{0, {8, {}, friction}, {start, {}}});
-  s.apply(MoveInstrument{0, start + Vec3{0.1, 0, -0.4}, {}, 0.2});
+  s.apply(scene::SetInstrument{0, {8, {}, friction}, {start, {}}});
+  s.apply(scene::MoveInstrument{0, start + Vec3{0.1, 0, -0.4}, {}, 0.2});
   for (int k = 0; k < 4; ++k)
     s.step(0.05);
   return {{s.displacement(0).begin(), s.displacement(0).end()},
@@ -302,11 +304,12 @@ Pressed pressed(const Model& model, const Model& stiff, std::optional<TwoStepOpt
 constexpr double forces_met = 4e-4;
 
 TEST(TwoStep, BelowItsThresholdInstrumentsMeetOneStage) {
-  const Model model = organ(), stiff = stiffened(model, 2, 5);
+  const model::Model model = organ(), stiff = stiffened(model, 2, 5);
   for (const double friction : {0.0, 0.3})
     for (const bool displaced : {false, true}) {
       const Pressed one = pressed(model, stiff, {}, friction, displaced),
-                    two = pressed(model, stiff, TwoStepOptions{1e9, true}, friction, displaced);
+                    two = pressed(model, stiff, statics::TwoStepOptions{1e9, true}, friction,
+                                  displaced);
       EXPECT_GT(norm(one.tool), 0);
       EXPECT_LT(test::relative_difference(one.u, two.u), forces_met);
       ASSERT_EQ(one.forces.size(), two.forces.size());
@@ -318,19 +321,19 @@ TEST(TwoStep, BelowItsThresholdInstrumentsMeetOneStage) {
 }
 
 TEST(TwoStep, BeyondItInstrumentsMeetThePointOfTheCurve) {
-  const Model model = organ(), stiff = stiffened(model, 2, 5);
+  const model::Model model = organ(), stiff = stiffened(model, 2, 5);
   for (const bool series : {false, true})
     for (const double friction : {0.0, 0.3})
       for (const bool displaced : {false, true}) {
         const double reached = norm(pressed(model, stiff, {}, friction, displaced).tool);
-        const TwoStepOptions options{reached / 3, series};
+        const statics::TwoStepOptions options{reached / 3, series};
         const Pressed one = pressed(model, stiff, {}, friction, displaced),
                       two = pressed(model, stiff, options, friction, displaced);
         EXPECT_GT(norm(two.tool - one.tool), 0.2 * norm(one.tool)); // it would show
         // The touched nodes displaced to where they are take the same forces.
-        Load load;
+        contact::Load load;
         double largest = 0;
-        for (const NodeVector& f : two.forces) {
+        for (const contact::NodeVector& f : two.forces) {
           load.displacement[f.node] = at(two.u, f.node);
           largest = test::larger(largest, norm(f.value));
         }
@@ -343,7 +346,7 @@ TEST(TwoStep, BeyondItInstrumentsMeetThePointOfTheCurve) {
         if (friction > 0)
           continue;
         const Vec3 centre{100.4, -49.8, 57.6};
-        for (const NodeVector& f : two.forces) {
+        for (const contact::NodeVector& f : two.forces) {
           const Vec3 n = model.nodes[f.node].position + at(two.u, f.node) - centre;
           if (f.node != free_nodes(model)[2]) {
             EXPECT_LT(norm(cross(f.value, n)), 1e-6 * norm(f.value) * norm(n));
@@ -354,7 +357,7 @@ TEST(TwoStep, BeyondItInstrumentsMeetThePointOfTheCurve) {
 
 /// Its support carries what presses on it, beyond the threshold as below.
 TEST(TwoStep, AnInstrumentPressesOnADisplacedNodeToo) {
-  const Model model = organ(), stiff = stiffened(model, 2, 5);
+  const model::Model model = organ(), stiff = stiffened(model, 2, 5);
   const auto middle = [&](const Triangle& t) {
     return (model.nodes[t[0]].position + model.nodes[t[1]].position + model.nodes[t[2]].position) /
            3;
@@ -363,15 +366,15 @@ TEST(TwoStep, AnInstrumentPressesOnADisplacedNodeToo) {
       model.triangles.begin(), model.triangles.end(),
       [&](const Triangle& a, const Triangle& b) { return middle(a).z < middle(b).z; });
   const Vec3 start = middle(top) + Vec3{0, 0, 2.1};
-  const auto press = [&](std::optional<TwoStepOptions> options, double friction) {
-    Simulation s(test::one_thread(),
-                 {.warn = [](const std::string& text) { ADD_FAILURE() << text; }});
-    s.add_object("o", model, Method::ffe);
+  const auto press = [&](std::optional<statics::TwoStepOptions> options, double friction) {
+    scene::Simulation s(test::one_thread(),
+                        {.warn = [](const std::string& text) { ADD_FAILURE() << text; }});
+    s.add_object("o", model, scene::Method::ffe);
     if (options)
-      s.apply(SetTwoStep{0, *options, [&] { return compliance_of(stiff); }});
-    s.apply(SetDisplacement{0, {top[1]}, {0.02, 0, -0.03}});
-    s.apply(SetInstrument{0, {2, {}, friction}, {start, {}}});
-    s.apply(MoveInstrument{0, start - Vec3{0, 0, 0.4}, {}, 0.2});
+      s.apply(scene::SetTwoStep{0, *options, [&] { return compliance_of(stiff); }});
+    s.apply(scene::SetDisplacement{0, {top[1]}, {0.02, 0, -0.03}});
+    s.apply(scene::SetInstrument{0, {2, {}, friction}, {start, {}}});
+    s.apply(scene::MoveInstrument{0, start - Vec3{0, 0, 0.4}, {}, 0.2});
     for (int k = 0; k < 4; ++k)
       s.step(0.05);
     EXPECT_EQ(s.instrument(0).nodes, 3U); // the displaced one among them
@@ -382,12 +385,12 @@ TEST(TwoStep, AnInstrumentPressesOnADisplacedNodeToo) {
   for (const bool series : {false, true})
     for (const double friction : {0.0, 0.3}) {
       const Pressed one = press({}, friction);
-      const TwoStepOptions options{norm(one.tool) / 3, series};
+      const statics::TwoStepOptions options{norm(one.tool) / 3, series};
       const Pressed two = press(options, friction);
       EXPECT_GT(norm(two.tool - one.tool), 0.1 * norm(one.tool)); // it would show
-      Load load;
+      contact::Load load;
       double largest = 0;
-      for (const NodeVector& f : two.forces) {
+      for (const contact::NodeVector& f : two.forces) {
         load.displacement[f.node] = at(two.u, f.node);
         largest = test::larger(largest, norm(f.value));
       }
@@ -405,13 +408,13 @@ struct Seen {
   double time = 0, strain = 0;
   std::size_t pending = 0, nodes = 0;
   std::vector<double> u;
-  std::vector<NodeVector> forces;
+  std::vector<contact::NodeVector> forces;
   Vec3 force, torque;
 
   bool operator==(const Seen&) const = default;
 };
-Seen seen(const Simulation& s) {
-  const InstrumentReport tool = s.instrument(0);
+Seen seen(const scene::Simulation& s) {
+  const scene::InstrumentReport tool = s.instrument(0);
   return {s.time(),          s.state().strain,    s.pending(), tool.nodes,
           test::shape(s, 0), s.contact_forces(0), tool.force,  tool.torque};
 }
@@ -419,39 +422,39 @@ Seen seen(const Simulation& s) {
 /// The step goes wrong when the object in contact has been through it: a second one that it shows
 /// then has no stiffness.
 TEST(TwoStep, AStepInContactThatFailsLeavesNoTrace) {
-  const Model model = organ(), stiff = stiffened(model, 2, 5);
-  Model away = model; // where no instrument is
-  for (Node& node : away.nodes)
+  const model::Model model = organ(), stiff = stiffened(model, 2, 5);
+  model::Model away = model; // where no instrument is
+  for (model::Node& node : away.nodes)
     node.position.x += 500;
   for (const bool series : {false, true})
     for (const double threshold : {5.0, 1e9})
       for (const double friction : {0.0, 0.3}) {
         std::vector<Seen> results[2];
         for (const bool fails : {false, true}) {
-          Simulation s(test::one_thread(), {.guard = true});
-          s.add_object("o", model, Method::ffe);
-          s.add_object("other",
-                       {.model = [&] { return away; },
-                        .stiffness = [](const Model&) -> std::shared_ptr<ComplianceSource> {
-                          throw Error("broken");
-                        }},
-                       Method::ffe);
-          s.apply(SetTwoStep{0, {threshold, series}, [&] { return compliance_of(stiff); }});
+          scene::Simulation s(test::one_thread(), {.guard = true});
+          s.add_object("o", model, scene::Method::ffe);
+          s.add_object(
+              "other",
+              {.model = [&] { return away; },
+               .stiffness = [](const model::Model&)
+                   -> std::shared_ptr<compliance::ComplianceSource> { throw Error("broken"); }},
+              scene::Method::ffe);
+          s.apply(scene::SetTwoStep{0, {threshold, series}, [&] { return compliance_of(stiff); }});
           // Most forces stay, so that their answer is followed by increments.
-          s.apply(SetForce{0, free_nodes(model), {0, 0.03, 0.01}});
-          s.apply(SetForce{0, {free_nodes(model)[2]}, {0.3, 0.7, 0}, 0.37}); // pulses
+          s.apply(scene::SetForce{0, free_nodes(model), {0, 0.03, 0.01}});
+          s.apply(scene::SetForce{0, {free_nodes(model)[2]}, {0.3, 0.7, 0}, 0.37}); // pulses
           const Vec3 start{100.3, -49.8, 58};
-          s.apply(SetInstrument{0, {8, {}, friction}, {start, {}}});
-          s.apply(MoveInstrument{0, start + Vec3{0.1, 0, -0.4}, {}, 0.2});
+          s.apply(scene::SetInstrument{0, {8, {}, friction}, {start, {}}});
+          s.apply(scene::MoveInstrument{0, start + Vec3{0.1, 0, -0.4}, {}, 0.2});
           s.step(0.1);
           EXPECT_GT(s.instrument(0).nodes, 0U);
           EXPECT_EQ(norm(s.instrument(0).force) > threshold, threshold < 1e9);
           if (fails) {
             const Seen before = seen(s);
-            s.apply(SetForce{1, {free_nodes(model)[4]}, {0, 0, 1}});
+            s.apply(scene::SetForce{1, {free_nodes(model)[4]}, {0, 0, 1}});
             EXPECT_THROW(s.step(0.1), Error);
             EXPECT_EQ(seen(s), before);
-            s.apply(Release{1, {free_nodes(model)[4]}});
+            s.apply(scene::Release{1, {free_nodes(model)[4]}});
           }
           for (int k = 0; k < 3; ++k) {
             s.step(0.025);
@@ -465,31 +468,31 @@ TEST(TwoStep, AStepInContactThatFailsLeavesNoTrace) {
 
 /// By two cuts, each of both stages for itself.
 TEST(TwoStep, ACutObjectFollowsTheStagesOfTheCutModels) {
-  const Model model = organ(3), stiff = stiffened(model, 2, 5);
+  const model::Model model = organ(3), stiff = stiffened(model, 2, 5);
   const std::uint32_t node = free_nodes(model)[2];
   for (const double threshold : {1.0, 1e9})
     for (const bool series : {false, true}) {
-      const TwoStepOptions options{threshold, series};
-      Simulation s(test::one_thread(), {});
-      s.add_object("o", model, Method::ffe);
-      s.apply(SetTwoStep{0, options, {}, std::make_shared<const Model>(stiff)});
-      s.apply(SetForce{0, {node}, {0, 3, 1}});
+      const statics::TwoStepOptions options{threshold, series};
+      scene::Simulation s(test::one_thread(), {});
+      s.add_object("o", model, scene::Method::ffe);
+      s.apply(scene::SetTwoStep{0, options, {}, std::make_shared<const model::Model>(stiff)});
+      s.apply(scene::SetForce{0, {node}, {0, 3, 1}});
       s.step(0.1);
       const std::vector<double> whole = test::shape(s, 0);
-      Model one = model, two = stiff;
+      model::Model one = model, two = stiff;
       std::vector<double> before = whole;
       for (const Vec3& normal : {Vec3{1, 0.1, 0}, Vec3{0.1, 1, 0}}) {
-        PlaneToCut what{{{100.2, -50, 30}, normal}, std::vector<std::uint32_t>{}};
-        for (std::uint32_t i = 0; i < surface_count(one); ++i)
+        scene::PlaneToCut what{{{100.2, -50, 30}, normal}, std::vector<std::uint32_t>{}};
+        for (std::uint32_t i = 0; i < model::surface_count(one); ++i)
           if (one.nodes[i].position.z > 40)
             what.nodes->push_back(i);
-        const Cut cut = plane_cut(one, what.plane, *what.nodes);
-        one = cut_model(one, cut).model;
-        two = cut_model(two, cut).model;
-        s.apply(CutObject{0, what});
+        const cutting::Cut cut = cutting::plane_cut(one, what.plane, *what.nodes);
+        one = cutting::cut_model(one, cut).model;
+        two = cutting::cut_model(two, cut).model;
+        s.apply(scene::CutObject{0, what});
         s.step(0.1);
         Stages stages(one, two, options);
-        Load load;
+        contact::Load load;
         load.force[node] = {0, 3, 1};
         EXPECT_LT(test::relative_difference(test::shape(s, 0), stages.shape(load)), 1e-9);
         Stages uncut(one, one, {.threshold = 1e9}); // it would show
@@ -499,30 +502,31 @@ TEST(TwoStep, ACutObjectFollowsTheStagesOfTheCutModels) {
         EXPECT_NE(test::shape(s, 0), before);
         before = test::shape(s, 0);
       }
-      s.apply(SetTwoStep{0, {threshold * 0.9, series}, {}}); // of what is cut
+      s.apply(scene::SetTwoStep{0, {threshold * 0.9, series}, {}}); // of what is cut
       s.step(0.1);
       EXPECT_EQ(test::shape(s, 0) == before, threshold == 1e9);
-      s.apply(SetTwoStep{0, options, {}});
-      s.apply(Restore{0});
+      s.apply(scene::SetTwoStep{0, options, {}});
+      s.apply(scene::Restore{0});
       s.step(0.1);
       EXPECT_LT(test::relative_difference(test::shape(s, 0), whole), 1e-12);
     }
 }
 
 TEST(TwoStep, WhatComesOffIsAsFastAsBelowTheThreshold) {
-  const Model model = test::soft_organ();
+  const model::Model model = test::soft_organ();
   const std::uint32_t top = test::highest(model);
   std::vector<std::vector<double>> parts;
   for (const bool staged : {false, true}) {
-    Simulation s(test::one_thread(), {});
-    s.add_object("o", model, Method::ffe);
+    scene::Simulation s(test::one_thread(), {});
+    s.add_object("o", model, scene::Method::ffe);
     if (staged)
-      s.apply(SetTwoStep{0, {1e9}, {}, std::make_shared<const Model>(stiffened(model, 2, 5))});
+      s.apply(scene::SetTwoStep{
+          0, {1e9}, {}, std::make_shared<const model::Model>(stiffened(model, 2, 5))});
     for (const double z : {0.1, 0.2}) {
-      s.apply(SetDisplacement{0, {top}, {0, 0, z}});
+      s.apply(scene::SetDisplacement{0, {top}, {0, 0, z}});
       s.step(0.01);
     }
-    s.apply(Release{0, {top}});
+    s.apply(scene::Release{0, {top}});
     s.apply(test::lobe_off());
     s.step(0.001);
     ASSERT_EQ(s.object_count(), 2U);
@@ -532,38 +536,39 @@ TEST(TwoStep, WhatComesOffIsAsFastAsBelowTheThreshold) {
 }
 
 TEST(TwoStep, RefusesAnotherModelAsSecondStage) {
-  const Model model = organ(2);
-  Model other = model;
+  const model::Model model = organ(2);
+  model::Model other = model;
   other.nodes[3].position.x += 1;
-  Simulation s({}, {});
-  s.add_object("o", model, Method::ffe);
-  for (const Model& wrong : {other, organ(3)})
-    EXPECT_THROW(s.apply(SetTwoStep{0, {1}, {}, std::make_shared<const Model>(wrong)}), Error);
+  scene::Simulation s({}, {});
+  s.add_object("o", model, scene::Method::ffe);
+  for (const model::Model& wrong : {other, organ(3)})
+    EXPECT_THROW(
+        s.apply(scene::SetTwoStep{0, {1}, {}, std::make_shared<const model::Model>(wrong)}), Error);
 }
 
 TEST(TwoStep, InASimulationByEventsWithAWarning) {
   std::vector<std::string> warnings;
-  const Model model = organ(), stiff = stiffened(model, 2, 5);
-  Simulation s({}, {.warn = [&](const std::string& text) { warnings.push_back(text); }});
-  s.add_object("still", model, Method::ffe);
-  s.add_object("moving", model, Method::ela);
+  const model::Model model = organ(), stiff = stiffened(model, 2, 5);
+  scene::Simulation s({}, {.warn = [&](const std::string& text) { warnings.push_back(text); }});
+  s.add_object("still", model, scene::Method::ffe);
+  s.add_object("moving", model, scene::Method::ela);
   const std::uint32_t node = free_nodes(model)[2];
   const auto second = [&] { return compliance_of(stiff); };
-  EXPECT_THROW(s.apply(SetTwoStep{1, {.threshold = 1}, second}), Error);
-  s.apply(SetForce{0, {node}, {0, 3, 0}});
-  s.schedule(0.5, SetTwoStep{0, {.threshold = 1}, second});
+  EXPECT_THROW(s.apply(scene::SetTwoStep{1, {.threshold = 1}, second}), Error);
+  s.apply(scene::SetForce{0, {node}, {0, 3, 0}});
+  s.schedule(0.5, scene::SetTwoStep{0, {.threshold = 1}, second});
   s.step(0.25);
   const std::vector<double> one(s.displacement(0).begin(), s.displacement(0).end());
   s.step(0.25);
   const std::vector<double> two(s.displacement(0).begin(), s.displacement(0).end());
   Stages stages(model, stiff, {.threshold = 1});
-  Load load;
+  contact::Load load;
   load.force[node] = {0, 3, 0};
   EXPECT_EQ(two, stages.shape(load));
   EXPECT_GT(test::relative_difference(two, one), 0.05);
   s.warn_of_thresholds();
   EXPECT_TRUE(warnings.empty());
-  s.apply(SetTwoStep{0, {.threshold = 10}, second});
+  s.apply(scene::SetTwoStep{0, {.threshold = 10}, second});
   s.step(0.1);
   EXPECT_EQ(std::vector<double>(s.displacement(0).begin(), s.displacement(0).end()), one);
   for (int k = 0; k < 2; ++k)
@@ -574,4 +579,4 @@ TEST(TwoStep, InASimulationByEventsWithAWarning) {
 }
 
 } // namespace
-} // namespace gewebe
+} // namespace gewebe::test

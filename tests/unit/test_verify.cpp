@@ -16,7 +16,7 @@ using namespace gewebe::test;
 namespace {
 
 /// Columns of some nodes in memory.
-class Kept final : public ColumnSink, public ColumnSource {
+class Kept final : public columns::ColumnSink, public columns::ColumnSource {
 public:
   Kept(std::size_t count, std::vector<std::uint32_t> nodes)
       : count_(count), nodes_(std::move(nodes)) {}
@@ -36,26 +36,28 @@ private:
 };
 
 struct Solved {
-  Model model = model_of(ball(2));
-  StiffnessMatrix matrix = stiffness_matrix(model);
-  StiffnessCheck check;
-  Factor factor = checked_factor(model, matrix, {}, check);
+  model::Model model = model_of(ball(2));
+  linalg::StiffnessMatrix matrix = fem::stiffness_matrix(model);
+  linalg::StiffnessCheck check;
+  linalg::Factor factor = linalg::checked_factor(model, matrix, {}, check);
   Kept columns{model.nodes.size(), {0, 5, 17, 40, 41}};
-  Solved() { (void)compliance_columns(matrix, factor, check.norm, columns.nodes(), {}, columns); }
-  Verification verify(const ColumnSource* source, bool single = false) const {
-    return verify_compliance(matrix, factor, source,
-                             {.condition = check.condition, .single = single}, {});
+  Solved() {
+    (void)columns::compliance_columns(matrix, factor, check.norm, columns.nodes(), {}, columns);
+  }
+  columns::Verification verify(const columns::ColumnSource* source, bool single = false) const {
+    return columns::verify_compliance(matrix, factor, source,
+                                      {.condition = check.condition, .single = single}, {});
   }
 };
 
 TEST(Verify, AgreesWithColumnsAndFactor) {
   const Solved s;
-  const Verification stored = s.verify(&s.columns);
+  const columns::Verification stored = s.verify(&s.columns);
   EXPECT_EQ(stored.columns_read, 15u);
   EXPECT_EQ(stored.recomputed, 3u);
   EXPECT_LT(stored.difference, 1e-11);
   EXPECT_LT(stored.asymmetry, 1e-13);
-  const Verification made = s.verify(nullptr);
+  const columns::Verification made = s.verify(nullptr);
   EXPECT_EQ(made.columns_read, 0u);
   EXPECT_EQ(made.recomputed, 3u);
   EXPECT_LT(made.difference, 1e-11);
@@ -84,7 +86,7 @@ TEST(Verify, SymmetryIsThatOfAllAxes) {
   std::vector<double>& column = s.columns.kept[1];
   double largest = 0;
   for (const double value : column)
-    largest = larger(largest, std::abs(value));
+    largest = numeric::larger(largest, std::abs(value));
   for (const std::size_t along : {0U, 1U, 2U})
     for (const std::size_t axis : {0U, 1U, 2U}) {
       double& entry = column[along * axes + 3 * std::size_t{17} + axis];
@@ -98,14 +100,15 @@ TEST(Verify, SymmetryIsThatOfAllAxes) {
 
 TEST(Verify, AnotherFactorIsFound) {
   const Solved s;
-  Model other = s.model;
-  for (Spring& spring : other.springs)
+  model::Model other = s.model;
+  for (model::Spring& spring : other.springs)
     spring.stiffness *= 1 + 1e-7;
-  StiffnessCheck check;
-  const Factor factor = checked_factor(other, stiffness_matrix(other), {}, check);
-  EXPECT_THROW(
-      (void)verify_compliance(s.matrix, factor, nullptr, {.condition = s.check.condition}, {}),
-      Error);
+  linalg::StiffnessCheck check;
+  const linalg::Factor factor =
+      linalg::checked_factor(other, fem::stiffness_matrix(other), {}, check);
+  EXPECT_THROW((void)columns::verify_compliance(s.matrix, factor, nullptr,
+                                                {.condition = s.check.condition}, {}),
+               Error);
 }
 
 TEST(Verify, ConjugateGradientsRefuseAnIndefiniteMatrix) {
@@ -113,7 +116,7 @@ TEST(Verify, ConjugateGradientsRefuseAnIndefiniteMatrix) {
   for (double& value : s.matrix.value)
     value = -value;
   std::vector<double> f(s.matrix.order(), 1.0), x(f.size());
-  EXPECT_THROW((void)conjugate_gradients(s.matrix, f, x, {}), Error);
+  EXPECT_THROW((void)columns::conjugate_gradients(s.matrix, f, x, {}), Error);
 }
 
 } // namespace

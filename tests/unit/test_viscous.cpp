@@ -26,33 +26,34 @@
 #include <string>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::test {
 namespace {
 
-const std::vector<PronyTerm> two_terms{{0.3, 0.2}, {0.25, 2}};
+const std::vector<model::PronyTerm> two_terms{{0.3, 0.2}, {0.25, 2}};
 
 /// What is left of a sudden stress.
-double left_of(std::span<const PronyTerm> terms, double t) {
+double left_of(std::span<const model::PronyTerm> terms, double t) {
   double left = 1;
-  for (const PronyTerm& term : terms)
+  for (const model::PronyTerm& term : terms)
     left -= term.share * (1 - std::exp(-t / term.time));
   return left;
 }
 
-std::vector<HyperelasticLaw> laws() {
-  return {test::stable_neo_hookean, parse_law("mooney-rivlin:c01=0.2"),
-          parse_law("yeoh:c20=0.1,c30=0.02"), parse_law("ogden:alpha1=5,alpha2=-2,mu2=0.3")};
+std::vector<model::HyperelasticLaw> laws() {
+  return {test::stable_neo_hookean, model::parse_law("mooney-rivlin:c01=0.2"),
+          model::parse_law("yeoh:c20=0.1,c30=0.02"),
+          model::parse_law("ogden:alpha1=5,alpha2=-2,mu2=0.3")};
 }
 
 TEST(ViscousLaw, ForcesAndTangentsAreDerivatives) {
   std::mt19937 random(3);
   std::uniform_real_distribution<double> any(-1, 1);
-  for (const HyperelasticLaw& law : laws()) {
-    SolidElement e = solid_element({Vec3{0, 0, 0}, {1, 0.1, 0}, {0.2, 1, 0}, {0, 0.3, 1.1}},
-                                   elasticity(1e3, 0.4));
+  for (const model::HyperelasticLaw& law : laws()) {
+    fem::SolidElement e = fem::solid_element(
+        {Vec3{0, 0, 0}, {1, 0.1, 0}, {0.2, 1, 0}, {0, 0.3, 1.1}}, fem::elasticity(1e3, 0.4));
     e.law = law;
-    std::vector<SymmetricTensor> stress(24);
-    for (SymmetricTensor& a : stress)
+    std::vector<fem::SymmetricTensor> stress(24);
+    for (fem::SymmetricTensor& a : stress)
       for (double& value : a)
         value = 100 * any(random);
     e.memory = {0.7, stress};
@@ -60,17 +61,17 @@ TEST(ViscousLaw, ForcesAndTangentsAreDerivatives) {
     for (Vec3& v : u)
       v = {0.05 * any(random), 0.05 * any(random), 0.05 * any(random)};
     const Vec3 bubble{0.01, -0.02, 0.01};
-    HyperelasticResponse here, more, less;
-    hyperelastic_response(e, u, bubble, HyperelasticPart::tangent, here);
+    fem::HyperelasticResponse here, more, less;
+    fem::hyperelastic_response(e, u, bubble, fem::HyperelasticPart::tangent, here);
     constexpr double d = 1e-6;
     double off = 0;
     for (std::size_t a = 0; a < 10; ++a)
       for (int i = 0; i < 3; ++i) {
         std::array<Vec3, 10> v = u;
         v[a][i] += d;
-        hyperelastic_response(e, v, bubble, HyperelasticPart::force, more);
+        fem::hyperelastic_response(e, v, bubble, fem::HyperelasticPart::force, more);
         v[a][i] -= 2 * d;
-        hyperelastic_response(e, v, bubble, HyperelasticPart::force, less);
+        fem::hyperelastic_response(e, v, bubble, fem::HyperelasticPart::force, less);
         EXPECT_NEAR((less.energy - more.energy) / (2 * d), here.force[a][i], 1e-4);
         for (std::size_t b = 0; b < 11; ++b)
           for (int j = 0; j < 3; ++j)
@@ -84,7 +85,7 @@ TEST(ViscousLaw, ForcesAndTangentsAreDerivatives) {
 }
 
 TEST(ViscousSolid, AHeldStretchRelaxesAsItsSeries) {
-  for (const HyperelasticLaw& law : laws()) {
+  for (const model::HyperelasticLaw& law : laws()) {
     test::ViscousBlock block(two_terms, law, 0.4999);
     block.stretch(1.3);
     (void)block.motion.settle({});
@@ -93,10 +94,10 @@ TEST(ViscousSolid, AHeldStretchRelaxesAsItsSeries) {
     // Steps of any length: the strain stays.
     for (const double h : {0.05, 0.2, 0.75, 4.0}) {
       block.stretch(1.3);
-      const SolidStep step = block.motion.settle({}, h);
+      const integrator::SolidStep step = block.motion.settle({}, h);
       EXPECT_LT(step.left, 1e-6);
       t += h;
-      EXPECT_NEAR(block.pull() / sudden, left_of(two_terms, t), 1e-3) << law_text(law) << t;
+      EXPECT_NEAR(block.pull() / sudden, left_of(two_terms, t), 1e-3) << model::law_text(law) << t;
     }
     block.stretch(1.3);
     (void)block.motion.settle({}, 1e4);
@@ -106,7 +107,7 @@ TEST(ViscousSolid, AHeldStretchRelaxesAsItsSeries) {
 
 TEST(ViscousSolid, AHeldStretchRelaxesInMotion) {
   for (const double h : {0.02, 0.1}) {
-    test::ViscousBlock block(two_terms, parse_law("yeoh:c20=0.1"), 0.499);
+    test::ViscousBlock block(two_terms, model::parse_law("yeoh:c20=0.1"), 0.499);
     block.stretch(1.3);
     (void)block.motion.settle({});
     const double sudden = block.pull();
@@ -123,17 +124,17 @@ TEST(ViscousSolid, AHeldStretchRelaxesInMotion) {
 }
 
 /// Strain of a small load, over the sudden one: the standard linear solid, incompressible.
-double crept(const PronyTerm& term, double t) {
+double crept(const model::PronyTerm& term, double t) {
   const double rest = 1 - term.share;
   return 1 + term.share / rest * (1 - std::exp(-t * rest / term.time));
 }
 
 TEST(ViscousSolid, CreepsAtRestAsTheStandardLinearSolid) {
-  const PronyTerm term{0.6, 0.5};
+  const model::PronyTerm term{0.6, 0.5};
   const test::ViscousModel block({&term, 1}, test::stable_neo_hookean, 0.4999);
-  const Load load = block.pulled(1);
+  const contact::Load load = block.pulled(1);
   for (const int parts : {1, 4}) {
-    SolidStatic solid(block.model, SolidLaw::hyperelastic, {});
+    dynamics::SolidStatic solid(block.model, integrator::SolidLaw::hyperelastic, {});
     solid.update(load, {0, 0});
     const double sudden = block.extension(solid.displacement());
     for (int k = 1; k <= parts; ++k) {
@@ -142,7 +143,7 @@ TEST(ViscousSolid, CreepsAtRestAsTheStandardLinearSolid) {
       EXPECT_NEAR(block.extension(solid.displacement()) / (sudden * crept(term, t)), 1, 1e-3) << t;
     }
     // At once and then for the whole time, as a scene has it.
-    SolidStatic other(block.model, SolidLaw::hyperelastic, {});
+    dynamics::SolidStatic other(block.model, integrator::SolidLaw::hyperelastic, {});
     other.update(load, {0, 3});
     EXPECT_NEAR(block.extension(other.displacement()) / (sudden * crept(term, 3)), 1, 1e-3);
     // Long after, what is left is elastic.
@@ -153,7 +154,7 @@ TEST(ViscousSolid, CreepsAtRestAsTheStandardLinearSolid) {
 
 /// Stretch of an incompressible bar of `mu` under a dead stress at time t: W = mu/2 (I1 - 3), one
 /// term; the integral by its definition in small steps.
-double crept_stretch(double mu, double stress, const PronyTerm& term, double end) {
+double crept_stretch(double mu, double stress, const model::PronyTerm& term, double end) {
   constexpr int steps = 4000;
   const double h = end / steps;
   const auto deviatoric = [&](double s) {
@@ -186,11 +187,11 @@ double crept_stretch(double mu, double stress, const PronyTerm& term, double end
 }
 
 TEST(ViscousSolid, CreepsAtRestUnderLargeStrains) {
-  const PronyTerm term{0.4, 0.5};
-  const test::ViscousModel block({&term, 1}, parse_law("yeoh"), 0.4999);
+  const model::PronyTerm term{0.4, 0.5};
+  const test::ViscousModel block({&term, 1}, model::parse_law("yeoh"), 0.4999);
   const double mu = test::viscous_young / (2 * 1.4999), stress = 0.8 * mu;
-  SolidStatic solid(block.model, SolidLaw::hyperelastic, {});
-  const Load load = block.pulled(stress);
+  dynamics::SolidStatic solid(block.model, integrator::SolidLaw::hyperelastic, {});
+  const contact::Load load = block.pulled(stress);
   for (const double t : {0.25, 1.0, 4.0}) {
     solid.update(load, {0, t});
     const double expected = crept_stretch(mu, stress, term, t) - 1;
@@ -199,7 +200,7 @@ TEST(ViscousSolid, CreepsAtRestUnderLargeStrains) {
 }
 
 TEST(ViscousSolid, CreepsInMotionAtSeveralSteps) {
-  const PronyTerm term{0.6, 0.5};
+  const model::PronyTerm term{0.6, 0.5};
   for (const double h : {1.0 / 800, 1.0 / 1600}) {
     test::ViscousBlock block({{term}}, test::stable_neo_hookean, 0.499, 1e-6);
     const std::vector<double> forces = block.of.forces(1);
@@ -215,11 +216,11 @@ TEST(ViscousSolid, CreepsInMotionAtSeveralSteps) {
 }
 
 TEST(ViscousSolid, AGradualLoadIsFollowed) {
-  const PronyTerm term{0.6, 0.5};
+  const model::PronyTerm term{0.6, 0.5};
   const test::ViscousModel block({&term, 1}, test::stable_neo_hookean, 0.4999);
-  SolidStatic sudden(block.model, SolidLaw::hyperelastic, {}),
-      gradual(block.model, SolidLaw::hyperelastic, {});
-  const Load load = block.pulled(1);
+  dynamics::SolidStatic sudden(block.model, integrator::SolidLaw::hyperelastic, {}),
+      gradual(block.model, integrator::SolidLaw::hyperelastic, {});
+  const contact::Load load = block.pulled(1);
   gradual.update(load, {0, 1, true});
   sudden.update(load, {0, 1});
   const double elastic = 1 / test::viscous_young, rest = 1 - term.share, slow = term.time / rest;
@@ -231,16 +232,16 @@ TEST(ViscousSolid, AGradualLoadIsFollowed) {
 
 TEST(ViscousSolid, EnergyOnlyFalls) {
   for (const int order : {1, 2}) {
-    TetMesh mesh = test::box_tetrahedra(6, 1, 1, 5);
+    tetrahedra::TetMesh mesh = test::box_tetrahedra(6, 1, 1, 5);
     if (order == 2)
-      make_quadratic(mesh);
-    const PronyTerm term{0.5, 0.05};
-    const std::vector<SolidMaterial> materials{
+      tetrahedra::make_quadratic(mesh);
+    const model::PronyTerm term{0.5, 0.05};
+    const std::vector<fem::SolidMaterial> materials{
         {1e4, 0.45, 1e-3, test::stable_neo_hookean, {&term, 1}}};
-    SolidMotionOptions options;
-    options.law = SolidLaw::hyperelastic;
+    integrator::SolidMotionOptions options;
+    options.law = integrator::SolidLaw::hyperelastic;
     options.tolerance = 1e-6;
-    SolidMotion motion(mesh, materials, options);
+    integrator::SolidMotion motion(mesh, materials, options);
     std::vector<std::uint8_t> held(3 * mesh.points.size());
     std::vector<double> velocity(held.size());
     for (std::size_t i = 0; i < mesh.points.size(); ++i) {
@@ -263,7 +264,7 @@ TEST(ViscousSolid, EnergyOnlyFalls) {
 }
 
 TEST(ViscousSolid, GoesBackToTheBit) {
-  test::ViscousBlock block(two_terms, parse_law("yeoh:c20=0.1"), 0.45, 1e-3);
+  test::ViscousBlock block(two_terms, model::parse_law("yeoh:c20=0.1"), 0.45, 1e-3);
   block.motion.hold(block.of.rollers());
   block.motion.set_load(block.of.forces(2000));
   const auto run = [&] {
@@ -287,9 +288,9 @@ TEST(ViscousSolid, GoesBackToTheBit) {
 }
 
 TEST(ViscousSolid, AnAnswerGoesBackToTheBit) {
-  const test::ViscousModel block(two_terms, parse_law("yeoh"), 0.45);
-  SolidStatic solid(block.model, SolidLaw::hyperelastic, {});
-  const Load load = block.pulled(2000);
+  const test::ViscousModel block(two_terms, model::parse_law("yeoh"), 0.45);
+  dynamics::SolidStatic solid(block.model, integrator::SolidLaw::hyperelastic, {});
+  const contact::Load load = block.pulled(2000);
   solid.update(load, {0, 0.5});
   const auto answer = solid.answer();
   const auto later = [&] {
@@ -302,31 +303,31 @@ TEST(ViscousSolid, AnAnswerGoesBackToTheBit) {
 }
 
 TEST(Prony, WordsAreReadAndWritten) {
-  const std::vector<PronyTerm> terms = parse_prony("prony:0.3@0.5,0.2@10");
-  EXPECT_EQ(terms, (std::vector<PronyTerm>{{0.3, 0.5}, {0.2, 10}}));
-  EXPECT_EQ(prony_text(terms), "prony:0.3@0.5,0.2@10");
+  const std::vector<model::PronyTerm> terms = model::parse_prony("prony:0.3@0.5,0.2@10");
+  EXPECT_EQ(terms, (std::vector<model::PronyTerm>{{0.3, 0.5}, {0.2, 10}}));
+  EXPECT_EQ(model::prony_text(terms), "prony:0.3@0.5,0.2@10");
   const std::array<const char*, 9> wrong{
       "prony",         "prony:",    "prony:0.3",         "prony:0.3@",
       "prony:x@1",     "prony:0@1", "prony:0.6@1,0.5@2", "prony:0.1@2,0.1@1",
       "prony:0.1@1e-9"};
   for (const char* word : wrong)
-    EXPECT_THROW((void)parse_prony(word), Error) << word;
-  const auto table = parse_material_table("a 1 1 1 1 0.4 yeoh prony:0.5@1\nb 1 1 1 1 0.4 "
-                                          "prony:0.5@1\nc 1 1 1 1 0.4 yeoh\n",
-                                          "t");
+    EXPECT_THROW((void)model::parse_prony(word), Error) << word;
+  const auto table = model::parse_material_table("a 1 1 1 1 0.4 yeoh prony:0.5@1\nb 1 1 1 1 0.4 "
+                                                 "prony:0.5@1\nc 1 1 1 1 0.4 yeoh\n",
+                                                 "t");
   EXPECT_EQ(table[0].prony.size(), 1U);
   EXPECT_TRUE(table[0].law.has_value());
   EXPECT_EQ(table[1].prony.size(), 1U);
   EXPECT_FALSE(table[1].law.has_value());
   EXPECT_TRUE(table[2].prony.empty());
-  EXPECT_THROW((void)parse_material_table("a 1 1 1 1 0.4 prony:0.5@1 yeoh", "t"), Error);
+  EXPECT_THROW((void)model::parse_material_table("a 1 1 1 1 0.4 prony:0.5@1 yeoh", "t"), Error);
 }
 
 TEST(Prony, LawsOfSmallStrainsAreRefused) {
   const test::ViscousModel block(two_terms, test::stable_neo_hookean, 0.45);
-  EXPECT_EQ(law_of(block.model, std::nullopt), SolidLaw::hyperelastic);
-  EXPECT_THROW((void)law_of(block.model, SolidLaw::corotational), Error);
+  EXPECT_EQ(dynamics::law_of(block.model, std::nullopt), integrator::SolidLaw::hyperelastic);
+  EXPECT_THROW((void)dynamics::law_of(block.model, integrator::SolidLaw::corotational), Error);
 }
 
 } // namespace
-} // namespace gewebe
+} // namespace gewebe::test

@@ -11,18 +11,19 @@
 #include <cstring>
 
 using namespace gewebe;
+using namespace gewebe::test;
 
 namespace {
 
-Grid sample_grid(float value = 0.75F) {
-  GridInfo info;
-  info.transform = uniform_transform(0.5);
+volume::Grid sample_grid(float value = 0.75F) {
+  volume::GridInfo info;
+  info.transform = volume::uniform_transform(0.5);
   info.isovalue = 0.25;
-  GridBuilder builder(info);
+  volume::GridBuilder builder(info);
   const std::vector<Int3> origins{{0, 0, 0}, {-8, 16, 8}, {128, 0, -16}};
-  const std::vector<LeafRef> leaves = builder.add_leaves({}, origins);
-  for (const LeafRef& leaf : leaves)
-    for (int n = 0; n < leaf_voxels; n += 3) {
+  const std::vector<volume::LeafRef> leaves = builder.add_leaves({}, origins);
+  for (const volume::LeafRef& leaf : leaves)
+    for (int n = 0; n < volume::leaf_voxels; n += 3) {
       leaf.values[n] = value * static_cast<float>(n) / 512;
       leaf.active[n / 64] |= std::uint64_t{1} << (n % 64);
     }
@@ -31,28 +32,28 @@ Grid sample_grid(float value = 0.75F) {
   return builder.finish();
 }
 
-std::string bytes_of(const Grid& grid, StreamWay way = usual_way,
-                     Packing packing = Packing::blosc) {
+std::string bytes_of(const volume::Grid& grid, formats::StreamWay way = formats::usual_way,
+                     formats::Packing packing = formats::Packing::blosc) {
   const ScratchFile file(".vdb");
-  Output output(file.path(), {});
-  write_volume(output, grid, {}, packing, way);
+  formats::Output output(file.path(), {});
+  formats::write_volume(output, grid, {}, packing, way);
   output.commit();
-  Input input(file.path());
+  formats::Input input(file.path());
   return input.read_all();
 }
 
-Grid grid_of(const std::string& bytes) {
-  return volume_from_bytes(bytes, "test.vdb");
+volume::Grid grid_of(const std::string& bytes) {
+  return formats::volume_from_bytes(bytes, "test.vdb");
 }
 
 /// A leaf for each way to tell inactive values: all background, all another value, two of them, as
 /// many as there are voxels; and one that is all active.
-Grid grid_of_all_kinds() {
-  GridBuilder builder(GridInfo{});
+volume::Grid grid_of_all_kinds() {
+  volume::GridBuilder builder(volume::GridInfo{});
   const std::vector<Int3> origins{{0, 0, 0}, {8, 0, 0}, {16, 0, 0}, {24, 0, 0}, {32, 0, 0}};
-  const std::vector<LeafRef> leaves = builder.add_leaves({}, origins);
+  const std::vector<volume::LeafRef> leaves = builder.add_leaves({}, origins);
   for (std::size_t kind = 0; kind < leaves.size(); ++kind)
-    for (int n = 0; n < leaf_voxels; ++n) {
+    for (int n = 0; n < volume::leaf_voxels; ++n) {
       const bool active = kind == 4 || n % 3 == 0;
       const auto number = static_cast<float>(n);
       leaves[kind].values[n] = active      ? 1 + number
@@ -69,14 +70,14 @@ Grid grid_of_all_kinds() {
 } // namespace
 
 TEST(VolumeFile, RoundTripKeepsEverything) {
-  const Grid grid = sample_grid();
-  const Grid back = grid_of(bytes_of(grid));
+  const volume::Grid grid = sample_grid();
+  const volume::Grid back = grid_of(bytes_of(grid));
   EXPECT_EQ(back.digest(), grid.digest());
   EXPECT_EQ(back.info().transform, grid.info().transform);
   EXPECT_EQ(back.info().isovalue, 0.25);
   EXPECT_EQ(back.leaves().size(), 3U);
   EXPECT_EQ(back.tiles().size(), 2U);
-  GridAccessor accessor(back);
+  volume::GridAccessor accessor(back);
   EXPECT_EQ(accessor.value({70, 70, 70}), 1.0F);
   EXPECT_EQ(accessor.value({100, 300, 100}), 0.5F);
   EXPECT_EQ(accessor.value({0, 0, 3}), 0.75F * 3 / 512);
@@ -85,14 +86,14 @@ TEST(VolumeFile, RoundTripKeepsEverything) {
 
 // Streams of another OpenVDB are left to it: what it writes and reads is what we do.
 TEST(VolumeFile, OpenvdbsOwnReaderAndWriterGiveTheSame) {
-  EXPECT_EQ(usual_way, StreamWay::parallel);
-  const Grid grid = sample_grid();
-  const std::string ours = bytes_of(grid, StreamWay::parallel);
-  const std::string theirs = bytes_of(grid, StreamWay::plain);
-  EXPECT_EQ(theirs, bytes_of(grid, StreamWay::plain));
+  EXPECT_EQ(formats::usual_way, formats::StreamWay::parallel);
+  const volume::Grid grid = sample_grid();
+  const std::string ours = bytes_of(grid, formats::StreamWay::parallel);
+  const std::string theirs = bytes_of(grid, formats::StreamWay::plain);
+  EXPECT_EQ(theirs, bytes_of(grid, formats::StreamWay::plain));
   for (const std::string& bytes : {ours, theirs})
-    for (const StreamWay way : {StreamWay::parallel, StreamWay::plain}) {
-      const Grid back = volume_from_bytes(bytes, "test.vdb", {}, way);
+    for (const formats::StreamWay way : {formats::StreamWay::parallel, formats::StreamWay::plain}) {
+      const volume::Grid back = formats::volume_from_bytes(bytes, "test.vdb", {}, way);
       EXPECT_EQ(back.digest(), grid.digest());
       EXPECT_EQ(back.active_voxels(), grid.active_voxels());
     }
@@ -101,20 +102,20 @@ TEST(VolumeFile, OpenvdbsOwnReaderAndWriterGiveTheSame) {
 }
 
 TEST(VolumeFile, UncompressedStreamsHoldTheSame) {
-  const Grid grid = grid_of_all_kinds();
+  const volume::Grid grid = grid_of_all_kinds();
   const std::string packed = bytes_of(grid);
-  const std::string ours = bytes_of(grid, StreamWay::parallel, Packing::none);
-  const std::string theirs = bytes_of(grid, StreamWay::plain, Packing::none);
+  const std::string ours = bytes_of(grid, formats::StreamWay::parallel, formats::Packing::none);
+  const std::string theirs = bytes_of(grid, formats::StreamWay::plain, formats::Packing::none);
   EXPECT_EQ(ours.substr(21, 36), packed.substr(21, 36)); // the UUID is that of the content
   EXPECT_NE(ours, packed);
   // The leaves, with which a stream ends, are OpenVDB's own bytes.
   EXPECT_EQ(ours.substr(ours.size() - 5000), theirs.substr(theirs.size() - 5000));
   for (const std::string& bytes : {packed, ours, theirs})
-    for (const StreamWay way : {StreamWay::parallel, StreamWay::plain}) {
-      const Grid back = volume_from_bytes(bytes, "test.vdb", {}, way);
+    for (const formats::StreamWay way : {formats::StreamWay::parallel, formats::StreamWay::plain}) {
+      const volume::Grid back = formats::volume_from_bytes(bytes, "test.vdb", {}, way);
       EXPECT_EQ(back.digest(), grid.digest());
       EXPECT_EQ(back.active_voxels(), grid.active_voxels());
-      GridAccessor accessor(back);
+      volume::GridAccessor accessor(back);
       EXPECT_EQ(accessor.value({8, 0, 1}), 0.5F);
       EXPECT_EQ(accessor.value({16, 0, 1}), 0.75F);
       EXPECT_EQ(accessor.value({24, 0, 1}), -1.0F);
@@ -125,11 +126,11 @@ TEST(VolumeFile, UncompressedStreamsHoldTheSame) {
 }
 
 TEST(VolumeFile, RotatedTransformSurvivesExactly) {
-  GridInfo info;
+  volume::GridInfo info;
   info.transform.m = {0.3, -0.4, 0, 1.25, 0.4, 0.3, 0, -7.1, 0, 0, 0.5, 1.0 / 3};
-  GridBuilder builder(info);
+  volume::GridBuilder builder(info);
   builder.add_tile({{0, 0, 0}, 8, 1.0F, true});
-  const Grid grid = builder.finish();
+  const volume::Grid grid = builder.finish();
   EXPECT_EQ(grid_of(bytes_of(grid)).info().transform, info.transform);
 }
 
@@ -142,10 +143,10 @@ TEST(VolumeFile, EqualContentGivesEqualBytesAndOtherContentAnotherUuid) {
 }
 
 TEST(VolumeFile, EveryTruncatedPrefixIsRefused) {
-  GridBuilder builder(GridInfo{});
+  volume::GridBuilder builder(volume::GridInfo{});
   const Int3 origin{8, 0, 0};
-  const LeafRef leaf = builder.add_leaves({}, {&origin, 1}).at(0);
-  for (int n = 0; n < leaf_voxels; n += 7) {
+  const volume::LeafRef leaf = builder.add_leaves({}, {&origin, 1}).at(0);
+  for (int n = 0; n < volume::leaf_voxels; n += 7) {
     leaf.values[n] = static_cast<float>(n);
     leaf.active[n / 64] |= std::uint64_t{1} << (n % 64);
   }
@@ -165,7 +166,7 @@ TEST(VolumeFile, HugeStringsInTheHeadTakeNoMemory) {
 }
 
 TEST(VolumeFile, ValuesThatAreNotFiniteAreRefused) {
-  GridBuilder builder(GridInfo{});
+  volume::GridBuilder builder(volume::GridInfo{});
   const Int3 origin{0, 0, 0};
   const auto leaf = builder.add_leaves({}, {&origin, 1}).at(0);
   leaf.values[5] = NAN;

@@ -17,7 +17,7 @@
 #include <sstream>
 #include <string>
 
-namespace gewebe {
+namespace gewebe::test {
 namespace {
 
 /// A cube of eight voxels.
@@ -42,14 +42,17 @@ std::string stream_of(const openvdb::GridPtrVec& grids, bool packed = true) {
 }
 
 std::string complaint(const std::string& bytes) {
-  const std::string said = test::complaint([&] { return volume_from_bytes(bytes, "x.vdb"); });
+  const std::string said =
+      test::complaint([&] { return formats::volume_from_bytes(bytes, "x.vdb"); });
   EXPECT_EQ(said.find('\n'), std::string::npos);
   EXPECT_TRUE(said.empty() || said.starts_with("x.vdb: ")) << said;
   return said.empty() ? said : said.substr(7);
 }
 
 double volume_of(const std::string& bytes) {
-  return examine_mesh(marching_cubes({}, volume_from_bytes(bytes, "x.vdb")).mesh).volume;
+  return mesh::examine_mesh(
+             surface::marching_cubes({}, formats::volume_from_bytes(bytes, "x.vdb")).mesh)
+      .volume;
 }
 
 TEST(VolumeFileOpenvdb, OtherTypesAreNamed) {
@@ -156,4 +159,4 @@ TEST(VolumeFileOpenvdb, TruncatedStreamsOfSeveralGridsAreRefused) {
 }
 
 } // namespace
-} // namespace gewebe
+} // namespace gewebe::test

@@ -17,14 +17,14 @@ namespace {
 using namespace gewebe;
 using namespace gewebe::test;
 
-const GridTransform unit_lattice = uniform_transform(1);
+const volume::GridTransform unit_lattice = volume::uniform_transform(1);
 
-std::set<Int3> voxels(const TriangleMesh& mesh, const GridTransform& t = unit_lattice,
-                      VoxelizeReport* report = nullptr) {
-  return inside_voxels(scan_inside(Context{}, mesh, t, {}, report));
+std::set<Int3> voxels(const TriangleMesh& mesh, const volume::GridTransform& t = unit_lattice,
+                      voxelization::VoxelizeReport* report = nullptr) {
+  return inside_voxels(voxelization::scan_inside(Context{}, mesh, t, {}, report));
 }
 
-std::uint64_t count(const InsideScan& scan) {
+std::uint64_t count(const voxelization::InsideScan& scan) {
   std::uint64_t sum = 0;
   for (const auto& leaf : scan.bits)
     for (const std::uint64_t word : leaf)
@@ -33,7 +33,7 @@ std::uint64_t count(const InsideScan& scan) {
     for (const std::uint32_t c : leaf)
       sum += c;
   const auto full = static_cast<std::uint64_t>(scan.samples * scan.samples * scan.samples);
-  for (const TileView& t : scan.tiles)
+  for (const volume::TileView& t : scan.tiles)
     sum += full * static_cast<std::uint64_t>(t.dim) * static_cast<std::uint64_t>(t.dim) *
            static_cast<std::uint64_t>(t.dim);
   return sum;
@@ -50,8 +50,8 @@ TEST(Voxelize, CubesOfEverySizeAtEveryEighth) {
       const double o = eighth / 8.0, s = size;
       // Different offsets along the three axes, so that faces on centres meet faces between them.
       const Vec3 low{o - 3, o / 2, -o - 20};
-      const InsideScan scan =
-          scan_inside(Context{}, box_mesh(low, low + Vec3{s, s, s}), unit_lattice, {});
+      const voxelization::InsideScan scan = voxelization::scan_inside(
+          Context{}, box_mesh(low, low + Vec3{s, s, s}), unit_lattice, {});
       ASSERT_EQ(count(scan), static_cast<std::uint64_t>(size) * static_cast<std::uint64_t>(size) *
                                  static_cast<std::uint64_t>(size))
           << "size " << size << " offset " << o;
@@ -70,7 +70,7 @@ TEST(Voxelize, BoxesOfAnySize) {
       high[a] = std::max(p, q) / 8.0;
       expected *= integers_between(low[a], high[a]);
     }
-    ASSERT_EQ(count(scan_inside(Context{}, box_mesh(low, high), unit_lattice, {})),
+    ASSERT_EQ(count(voxelization::scan_inside(Context{}, box_mesh(low, high), unit_lattice, {})),
               static_cast<std::uint64_t>(expected));
   }
 }
@@ -123,8 +123,8 @@ TEST(Voxelize, EveryRayIsEvenWhenEveryPointIsOnACentre) {
       p = n % 2 == 0 ? Vec3{std::round(p.x), std::round(p.y), std::round(p.z)}
                      : Vec3{static_cast<double>(place(random)), static_cast<double>(place(random)),
                             static_cast<double>(place(random))};
-    VoxelizeReport report;
-    EXPECT_NO_THROW(scan_inside(Context{}, mesh, unit_lattice, {}, &report));
+    voxelization::VoxelizeReport report;
+    EXPECT_NO_THROW(voxelization::scan_inside(Context{}, mesh, unit_lattice, {}, &report));
     EXPECT_EQ(report.odd_rays, 0u);
     EXPECT_EQ(report.boundary_edges, 0u);
     EXPECT_GT(report.exact_tests, 0u);
@@ -143,7 +143,7 @@ TEST(Voxelize, SliversAreExact) {
                      {tiny(random), tiny(random), tiny(random)},
                      {1, 1, 1 + tiny(random)}};
     needle.triangles = {{0, 1, 2}, {0, 1, 3}, {0, 2, 3}, {1, 2, 3}};
-    VoxelizeReport report;
+    voxelization::VoxelizeReport report;
     const auto inside = voxels(needle, unit_lattice, &report);
     EXPECT_EQ(report.odd_rays, 0u);
     EXPECT_LE(inside.size(), 61u);
@@ -157,16 +157,18 @@ TEST(Voxelize, SphereVolumeConverges) {
   const double volume = signed_volume(mesh);
   double last = 1;
   for (const double voxel : {1.0, 0.25}) {
-    const double measured =
-        static_cast<double>(count(scan_inside(Context{}, mesh, uniform_transform(voxel), {}))) *
-        voxel * voxel * voxel;
+    const double measured = static_cast<double>(count(voxelization::scan_inside(
+                                Context{}, mesh, volume::uniform_transform(voxel), {}))) *
+                            voxel * voxel * voxel;
     const double error = std::fabs(measured / volume - 1);
     EXPECT_LT(error, 0.02 * voxel);
     EXPECT_LT(error, last);
     last = error;
   }
   const double boxed =
-      static_cast<double>(count(scan_inside(Context{}, mesh, unit_lattice, {.samples = 8}))) / 512;
+      static_cast<double>(
+          count(voxelization::scan_inside(Context{}, mesh, unit_lattice, {.samples = 8}))) /
+      512;
   EXPECT_LT(std::fabs(boxed / volume - 1), 0.001);
 }
 
@@ -199,28 +201,30 @@ TEST(Voxelize, SameScanForAnyNumberOfThreads) {
     Context one, two;
     one.threads = 1;
     two.threads = 2;
-    const InsideScan a = scan_inside(one, mesh, unit_lattice, {.samples = samples});
-    const InsideScan b = scan_inside(two, mesh, unit_lattice, {.samples = samples});
+    const voxelization::InsideScan a =
+        voxelization::scan_inside(one, mesh, unit_lattice, {.samples = samples});
+    const voxelization::InsideScan b =
+        voxelization::scan_inside(two, mesh, unit_lattice, {.samples = samples});
     EXPECT_EQ(a.origins, b.origins);
     EXPECT_EQ(a.bits, b.bits);
     EXPECT_EQ(a.counts, b.counts);
     ASSERT_EQ(a.tiles.size(), b.tiles.size());
-    EXPECT_EQ(grid_from_scan(one, a, unit_lattice).digest(),
-              grid_from_scan(two, b, unit_lattice).digest());
+    EXPECT_EQ(voxelization::grid_from_scan(one, a, unit_lattice).digest(),
+              voxelization::grid_from_scan(two, b, unit_lattice).digest());
   }
 }
 
 TEST(Voxelize, LargeInteriorsBecomeLargeTiles) {
-  const InsideScan scan =
-      scan_inside(Context{}, box_mesh({-200, -200, -200}, {200, 200, 200}), unit_lattice, {});
+  const voxelization::InsideScan scan = voxelization::scan_inside(
+      Context{}, box_mesh({-200, -200, -200}, {200, 200, 200}), unit_lattice, {});
   EXPECT_EQ(std::count_if(scan.tiles.begin(), scan.tiles.end(),
-                          [](const TileView& t) { return t.dim == 128; }),
+                          [](const volume::TileView& t) { return t.dim == 128; }),
             8);
   EXPECT_EQ(count(scan), 400u * 400 * 400);
   EXPECT_TRUE(scan.origins.empty()); // ±200 is a multiple of 8: nothing but tiles
-  const Grid grid = grid_from_scan(Context{}, scan, unit_lattice);
+  const volume::Grid grid = voxelization::grid_from_scan(Context{}, scan, unit_lattice);
   EXPECT_EQ(grid.active_voxels(), 400u * 400 * 400);
-  GridAccessor value(grid);
+  volume::GridAccessor value(grid);
   EXPECT_EQ(value.value({-200, 0, 199}), 1.0f);
   EXPECT_EQ(value.value({-201, 0, 0}), 0.0f);
   EXPECT_EQ(value.value({0, 200, 0}), 0.0f);
@@ -232,7 +236,7 @@ TEST(Voxelize, BoxFilterIsTheMeanOfTheFineScan) {
   rotate(mesh, 1);
   for (const int n : {2, 3, 8}) {
     // The fine lattice by itself: sample f is at (f + ½)/n - ½.
-    GridTransform fine = uniform_transform(1.0 / n);
+    volume::GridTransform fine = volume::uniform_transform(1.0 / n);
     for (const std::size_t at : {3u, 7u, 11u})
       fine.m[at] = 0.5 / n - 0.5;
     std::map<Int3, std::uint32_t> expected;
@@ -240,8 +244,8 @@ TEST(Voxelize, BoxFilterIsTheMeanOfTheFineScan) {
       const auto down = [&](std::int32_t x) { return (x - ((x % n) + n) % n) / n; };
       ++expected[{down(f[0]), down(f[1]), down(f[2])}];
     }
-    const Grid grid = voxelize(Context{}, mesh, unit_lattice, {.samples = n});
-    GridAccessor value(grid);
+    const volume::Grid grid = voxelization::voxelize(Context{}, mesh, unit_lattice, {.samples = n});
+    volume::GridAccessor value(grid);
     const float full = static_cast<float>(n * n * n);
     for (std::int32_t i = -9; i < 9; ++i)
       for (std::int32_t j = -9; j < 9; ++j)
@@ -256,20 +260,20 @@ TEST(Voxelize, BoxFilterIsTheMeanOfTheFineScan) {
 
 TEST(Voxelize, HalfAVoxelMatters) { // negative control of all comparisons above
   const TriangleMesh mesh = sphere_mesh(3, 9, {0.1, 0.2, 0.3});
-  GridTransform shifted = unit_lattice;
+  volume::GridTransform shifted = unit_lattice;
   shifted.m[3] = 0.5;
   EXPECT_NE(voxels(mesh), voxels(mesh, shifted));
 }
 
 TEST(Voxelize, RotatedLatticesSeeTheSameSolid) {
   const TriangleMesh mesh = sphere_mesh(3, 9, {0.1, 0.2, 0.3});
-  GridTransform rotated; // quarter turn about z: index (i, j, k) is world (-j, i, k)
+  volume::GridTransform rotated; // quarter turn about z: index (i, j, k) is world (-j, i, k)
   rotated.m = {0, -1, 0, 0, 1, 0, 0, 0, 0, 0, 1, 0};
   std::set<Int3> expected;
   for (const Int3& v : voxels(mesh))
     expected.insert({v[1], -v[0], v[2]});
   EXPECT_EQ(voxels(mesh, rotated), expected);
-  GridTransform flat = unit_lattice;
+  volume::GridTransform flat = unit_lattice;
   flat.m[0] = 2;
   EXPECT_THROW(voxels(mesh, flat), Error);
 }
@@ -277,26 +281,27 @@ TEST(Voxelize, RotatedLatticesSeeTheSameSolid) {
 TEST(Voxelize, OpenMeshesAreCountedSkippedOrFilled) {
   TriangleMesh open = box_mesh({0.2, 0.2, 0.2}, {10.2, 10.2, 10.2});
   open.triangles.erase(open.triangles.begin(), open.triangles.begin() + 2); // the face z = 0.2
-  VoxelizeReport report;
+  voxelization::VoxelizeReport report;
   try {
-    scan_inside(Context{}, open, unit_lattice, {}, &report);
+    voxelization::scan_inside(Context{}, open, unit_lattice, {}, &report);
     FAIL() << "an open mesh passed";
   } catch (const Error& error) {
     EXPECT_NE(std::string(error.what()).find("4 boundary edges"), std::string::npos);
     EXPECT_NE(std::string(error.what()).find("100 odd rays"), std::string::npos);
   }
   EXPECT_EQ(report.holes, 1u);
-  const InsideScan skipped =
-      scan_inside(Context{}, open, unit_lattice, {.on_open = OpenMesh::skip}, &report);
+  const voxelization::InsideScan skipped = voxelization::scan_inside(
+      Context{}, open, unit_lattice, {.on_open = voxelization::OpenMesh::skip}, &report);
   EXPECT_EQ(report.odd_rays, 100u);
   EXPECT_EQ(count(skipped), 0u);
-  const InsideScan filled =
-      scan_inside(Context{}, open, unit_lattice, {.on_open = OpenMesh::fill}, &report);
+  const voxelization::InsideScan filled = voxelization::scan_inside(
+      Context{}, open, unit_lattice, {.on_open = voxelization::OpenMesh::fill}, &report);
   EXPECT_EQ(report.odd_rays, 0u);
   EXPECT_EQ(count(filled), 1000u);
   for (const int samples : {2, 3}) {
-    const InsideScan boxed = scan_inside(Context{}, open, unit_lattice,
-                                         {.samples = samples, .on_open = OpenMesh::skip}, &report);
+    const voxelization::InsideScan boxed = voxelization::scan_inside(
+        Context{}, open, unit_lattice,
+        {.samples = samples, .on_open = voxelization::OpenMesh::skip}, &report);
     EXPECT_GE(report.odd_rays, 100u * static_cast<std::uint64_t>(samples * samples));
     EXPECT_EQ(count(boxed), 0u);
   }
@@ -305,8 +310,8 @@ TEST(Voxelize, OpenMeshesAreCountedSkippedOrFilled) {
 TEST(Voxelize, OneMissingTriangleIsFound) {
   TriangleMesh mesh = sphere_mesh(2, 9, {0.1, 0.2, 0.3});
   mesh.triangles.pop_back();
-  VoxelizeReport report;
-  EXPECT_THROW(scan_inside(Context{}, mesh, unit_lattice, {}, &report), Error);
+  voxelization::VoxelizeReport report;
+  EXPECT_THROW(voxelization::scan_inside(Context{}, mesh, unit_lattice, {}, &report), Error);
   EXPECT_EQ(report.boundary_edges, 3u);
 }
 
@@ -328,10 +333,10 @@ TEST(Voxelize, ConesCloseAnyMesh) {
     TriangleMesh mesh = sphere_mesh(2, 9, {0.1, 0.2, 0.3});
     std::shuffle(mesh.triangles.begin(), mesh.triangles.end(), random);
     mesh.triangles.resize(mesh.triangles.size() / 2);
-    const auto edges = odd_edges(mesh.points, mesh.triangles);
+    const auto edges = mesh::odd_edges(mesh.points, mesh.triangles);
     EXPECT_FALSE(edges.empty());
-    close_with_cones(edges, mesh.points, mesh.triangles);
-    EXPECT_TRUE(odd_edges(mesh.points, mesh.triangles).empty());
+    mesh::close_with_cones(edges, mesh.points, mesh.triangles);
+    EXPECT_TRUE(mesh::odd_edges(mesh.points, mesh.triangles).empty());
   }
 }
 
@@ -341,24 +346,26 @@ TEST(Voxelize, AbsurdSizesAreRefusedWithTheNumber) {
   context.max_memory = std::uint64_t{8} << 30;
   for (const double voxel : {1e-6, 1e-9, 1e-60}) {
     try {
-      scan_inside(context, mesh, uniform_transform(voxel), {});
+      voxelization::scan_inside(context, mesh, volume::uniform_transform(voxel), {});
       FAIL() << "accepted voxels of " << voxel;
     } catch (const Error& error) {
       EXPECT_NE(std::string(error.what()).find("needs"), std::string::npos) << error.what();
     }
   }
-  EXPECT_THROW(scan_inside(Context{}, mesh, uniform_transform(1e-9), {}), Error); // 2^30
-  EXPECT_THROW(scan_inside(Context{}, {}, unit_lattice, {}), Error);
+  EXPECT_THROW(voxelization::scan_inside(Context{}, mesh, volume::uniform_transform(1e-9), {}),
+               Error); // 2^30
+  EXPECT_THROW(voxelization::scan_inside(Context{}, {}, unit_lattice, {}), Error);
   for (const double voxel : {1e-300, 1e300})
-    EXPECT_THROW(scan_inside(Context{}, mesh, uniform_transform(voxel), {}), Error);
+    EXPECT_THROW(voxelization::scan_inside(Context{}, mesh, volume::uniform_transform(voxel), {}),
+                 Error);
 }
 
 TEST(Voxelize, TheEstimateHolds) {
   Context context;
   for (const double radius : {3.0, 30.0, 150.0}) {
     const TriangleMesh mesh = sphere_mesh(3, radius, {0, 0, 0});
-    const Grid grid = voxelize(context, mesh, unit_lattice, {});
-    const double estimate = voxelize_bytes(mesh, unit_lattice, 1);
+    const volume::Grid grid = voxelization::voxelize(context, mesh, unit_lattice, {});
+    const double estimate = voxelization::voxelize_bytes(mesh, unit_lattice, 1);
     EXPECT_LT(static_cast<double>(grid.memory_bytes()), estimate);
     EXPECT_GT(static_cast<double>(grid.memory_bytes()), 0.02 * estimate);
   }

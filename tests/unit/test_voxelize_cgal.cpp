@@ -15,23 +15,27 @@ using namespace gewebe;
 using namespace gewebe::test;
 
 /// Compares all voxels around the mesh.
-SideCount compare(const TriangleMesh& mesh, const GridTransform& lattice,
-                  const GridTransform& tested_lattice) {
+SideCount compare(const TriangleMesh& mesh, const volume::GridTransform& lattice,
+                  const volume::GridTransform& tested_lattice) {
   const CgalSide side(mesh, lattice);
   EXPECT_EQ(side.faces(), mesh.triangles.size());
   Box3 box;
   for (const Vec3& point : mesh.points)
     box.add(lattice.to_index(point));
-  VoxelizeReport report;
-  const InsideScan scan = scan_inside(Context{}, mesh, tested_lattice, {}, &report);
+  voxelization::VoxelizeReport report;
+  const voxelization::InsideScan scan =
+      voxelization::scan_inside(Context{}, mesh, tested_lattice, {}, &report);
   EXPECT_EQ(report.odd_rays, 0u);
   return compare_box(
-      side, scan, {floor_int(box.min.x) - 1, floor_int(box.min.y) - 1, floor_int(box.min.z) - 1},
-      {floor_int(box.max.x) + 2, floor_int(box.max.y) + 2, floor_int(box.max.z) + 2});
+      side, scan,
+      {voxelization::floor_int(box.min.x) - 1, voxelization::floor_int(box.min.y) - 1,
+       voxelization::floor_int(box.min.z) - 1},
+      {voxelization::floor_int(box.max.x) + 2, voxelization::floor_int(box.max.y) + 2,
+       voxelization::floor_int(box.max.z) + 2});
 }
 
 SideCount compare(const TriangleMesh& mesh) {
-  return compare(mesh, uniform_transform(1), uniform_transform(1));
+  return compare(mesh, volume::uniform_transform(1), volume::uniform_transform(1));
 }
 
 TEST(VoxelizeCgal, RandomRotatedSolids) {
@@ -59,9 +63,9 @@ TEST(VoxelizeCgal, PointsOnVoxelCentres) {
 }
 
 TEST(VoxelizeCgal, HalfAVoxelIsSeen) { // negative control
-  GridTransform shifted = uniform_transform(1);
+  volume::GridTransform shifted = volume::uniform_transform(1);
   shifted.m[7] = 0.5;
-  EXPECT_GT(compare(sphere_mesh(2, 12, {}), uniform_transform(1), shifted).wrong, 100u);
+  EXPECT_GT(compare(sphere_mesh(2, 12, {}), volume::uniform_transform(1), shifted).wrong, 100u);
 }
 
 TEST(VoxelizeCgal, Cubes) {
@@ -126,22 +130,23 @@ void compare_file(const std::string& name, std::int64_t dim) {
   const TriangleMesh mesh = load_test_mesh(name);
   if (mesh.triangles.empty())
     GTEST_SKIP() << "no " << name;
-  const GridTransform lattice = lattice_for_dim(bounding_box(mesh), dim);
+  const volume::GridTransform lattice = volume::lattice_for_dim(bounding_box(mesh), dim);
   const CgalSide side(mesh, lattice);
   ASSERT_EQ(side.faces(), mesh.triangles.size());
-  VoxelizeReport report;
-  const InsideScan scan = scan_inside(Context{}, mesh, lattice, {}, &report);
+  voxelization::VoxelizeReport report;
+  const voxelization::InsideScan scan =
+      voxelization::scan_inside(Context{}, mesh, lattice, {}, &report);
   EXPECT_EQ(report.odd_rays, 0u);
   const ScanLookup lookup(scan);
   SideCount result;
   const auto ask = [&](const Int3& v) { result.add(side.at(v), lookup.inside(v)); };
   for (const Int3& o : scan.origins)
-    for (std::int32_t v = 0; v < leaf_voxels; ++v)
+    for (std::int32_t v = 0; v < volume::leaf_voxels; ++v)
       ask({o[0] + v / 64, o[1] + v / 8 % 8, o[2] + v % 8});
-  for (const TileView& t : scan.tiles)
+  for (const volume::TileView& t : scan.tiles)
     ask({t.origin[0] + t.dim / 2, t.origin[1] + t.dim / 2, t.origin[2] + t.dim / 2});
   Int3 min{}, max{};
-  EXPECT_TRUE(index_range(lattice, bounding_box(mesh), min, max));
+  EXPECT_TRUE(volume::index_range(lattice, bounding_box(mesh), min, max));
   std::mt19937 random(1);
   for (int n = 0; n < 20000; ++n) {
     Int3 v{};

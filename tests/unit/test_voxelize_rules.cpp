@@ -21,11 +21,12 @@ namespace {
 using namespace gewebe;
 using namespace gewebe::test;
 
-const GridTransform unit_lattice = uniform_transform(1);
+const volume::GridTransform unit_lattice = volume::uniform_transform(1);
 
-std::set<Int3> voxels(const TriangleMesh& mesh, VoxelRule rule, VoxelizeReport* report = nullptr,
-                      const Context& context = {}) {
-  return inside_voxels(scan_inside(context, mesh, unit_lattice, {.rule = rule}, report));
+std::set<Int3> voxels(const TriangleMesh& mesh, voxelization::VoxelRule rule,
+                      voxelization::VoxelizeReport* report = nullptr, const Context& context = {}) {
+  return inside_voxels(
+      voxelization::scan_inside(context, mesh, unit_lattice, {.rule = rule}, report));
 }
 
 TriangleMesh turned(TriangleMesh mesh) {
@@ -62,7 +63,7 @@ Agreement agreement(const TriangleMesh& mesh, const std::set<Int3>& inside,
                     const std::function<bool(const Int3&)>& skip = {}) {
   constexpr int margin = 2;
   Int3 min{}, max{};
-  EXPECT_TRUE(index_range(unit_lattice, bounding_box(mesh), min, max));
+  EXPECT_TRUE(volume::index_range(unit_lattice, bounding_box(mesh), min, max));
   Agreement result;
   for (std::int32_t i = min[0] - margin; i <= max[0] + margin; ++i)
     for (std::int32_t j = min[1] - margin; j <= max[1] + margin; ++j)
@@ -85,19 +86,19 @@ Agreement agreement(const TriangleMesh& mesh, const std::set<Int3>& inside,
 TEST(VoxelizeWinding, ClosedSurfacesAreFilledWhereTheyWindAtAll) {
   const TriangleMesh a = sphere_mesh(3, 9, {0.1, 0.2, 0.3}), b = sphere_mesh(2, 7, {6, 1, -2}),
                      c = sphere_mesh(2, 3, {-1, 0, 0});
-  std::set<Int3> expected = voxels(a, VoxelRule::parity);
+  std::set<Int3> expected = voxels(a, voxelization::VoxelRule::parity);
   for (const TriangleMesh* part : {&b, &c})
-    expected.merge(voxels(*part, VoxelRule::parity));
+    expected.merge(voxels(*part, voxelization::VoxelRule::parity));
   TriangleMesh all = a;
   append(all, turned(b)); // overlaps, badly oriented
   append(all, c);         // within
-  VoxelizeReport report;
-  EXPECT_EQ(voxels(all, VoxelRule::winding, &report), expected);
+  voxelization::VoxelizeReport report;
+  EXPECT_EQ(voxels(all, voxelization::VoxelRule::winding, &report), expected);
   EXPECT_EQ(report.parts, 3u);
   EXPECT_EQ(report.parts_turned, 1u);
   EXPECT_EQ(report.boundary_edges, 0u);
   EXPECT_EQ(report.samples_summed, 0u);
-  EXPECT_NE(voxels(all, VoxelRule::parity), expected); // negative control
+  EXPECT_NE(voxels(all, voxelization::VoxelRule::parity), expected); // negative control
 }
 
 TEST(VoxelizeWinding, OneSolidIsAsByParityTiesIncluded) {
@@ -106,28 +107,29 @@ TEST(VoxelizeWinding, OneSolidIsAsByParityTiesIncluded) {
     for (int eighth = 0; eighth < 8; ++eighth) {
       const Vec3 low{eighth / 8.0, -7, eighth / 4.0};
       const TriangleMesh cube = box_mesh(low, low + Vec3{1.0 * size, 1.0 * size, 1.0 * size});
-      EXPECT_EQ(voxels(cube, VoxelRule::winding), voxels(cube, VoxelRule::parity));
+      EXPECT_EQ(voxels(cube, voxelization::VoxelRule::winding),
+                voxels(cube, voxelization::VoxelRule::parity));
     }
   TriangleMesh ball = sphere_mesh(2, 12, {});
   for (Vec3& p : ball.points)
     p = {std::round(p.x), std::round(p.y), std::round(p.z)};
-  const auto expected = voxels(ball, VoxelRule::parity);
-  EXPECT_EQ(voxels(ball, VoxelRule::winding), expected);
+  const auto expected = voxels(ball, voxelization::VoxelRule::parity);
+  EXPECT_EQ(voxels(ball, voxelization::VoxelRule::winding), expected);
   for (Triangle& t : ball.triangles) // half of the triangles badly oriented
     if (random() % 2 == 0)
       std::swap(t[0], t[1]);
-  VoxelizeReport report;
-  EXPECT_EQ(voxels(ball, VoxelRule::winding, &report), expected);
+  voxelization::VoxelizeReport report;
+  EXPECT_EQ(voxels(ball, voxelization::VoxelRule::winding, &report), expected);
   EXPECT_GT(report.triangles_turned, ball.triangles.size() / 4);
 }
 
 TEST(VoxelizeWinding, DuplicateTrianglesCountOnce) {
   TriangleMesh mesh = sphere_mesh(2, 9, {0.1, 0.2, 0.3});
-  const auto expected = voxels(mesh, VoxelRule::parity);
+  const auto expected = voxels(mesh, voxelization::VoxelRule::parity);
   for (std::size_t n = 0; n < 40; ++n)
     mesh.triangles.push_back(mesh.triangles[7 * n]);
-  VoxelizeReport report;
-  EXPECT_EQ(voxels(mesh, VoxelRule::winding, &report), expected);
+  voxelization::VoxelizeReport report;
+  EXPECT_EQ(voxels(mesh, voxelization::VoxelRule::winding, &report), expected);
   EXPECT_EQ(report.triangles_duplicate, 40u);
 }
 
@@ -145,8 +147,8 @@ TEST(VoxelizeWinding, OpenSurfacesAgreeWithTheSumOfAllSolidAngles) {
   for (const TriangleMesh& mesh :
        {without(ball, [](const Vec3& p) { return p.z > 8; }),
         without(ball, [](const Vec3& p) { return p.x + p.y > 0.5; }), two, moth_eaten, cube}) {
-    VoxelizeReport report;
-    const auto inside = voxels(mesh, VoxelRule::winding, &report);
+    voxelization::VoxelizeReport report;
+    const auto inside = voxels(mesh, voxelization::VoxelRule::winding, &report);
     const auto on_cube = [&](const Int3& v) { // where the winding number jumps
       return number == 4 && v[2] >= -5 && v[2] <= 4 && v[0] >= -4 && v[0] <= 5 && v[1] >= -3 &&
              v[1] <= 6 && (v[0] == -4 || v[0] == 5 || v[1] == -3 || v[1] == 6 || v[2] == 4);
@@ -169,9 +171,12 @@ TEST(VoxelizeWinding, SameForAnyThreadsAndProcessor) {
   one.threads = 1;
   one.cpu = CpuLevel::baseline;
   two.threads = 2;
-  for (const VoxelRule rule : {VoxelRule::winding, VoxelRule::zbuffer}) {
-    const InsideScan a = scan_inside(one, mesh, unit_lattice, {.rule = rule});
-    const InsideScan b = scan_inside(two, mesh, unit_lattice, {.rule = rule});
+  for (const voxelization::VoxelRule rule :
+       {voxelization::VoxelRule::winding, voxelization::VoxelRule::zbuffer}) {
+    const voxelization::InsideScan a =
+        voxelization::scan_inside(one, mesh, unit_lattice, {.rule = rule});
+    const voxelization::InsideScan b =
+        voxelization::scan_inside(two, mesh, unit_lattice, {.rule = rule});
     EXPECT_EQ(a.origins, b.origins);
     EXPECT_EQ(a.bits, b.bits);
     EXPECT_EQ(a.tiles.size(), b.tiles.size());
@@ -182,7 +187,8 @@ TEST(VoxelizeWinding, SameForAnyThreadsAndProcessor) {
 TEST(SolidAngleTree, TreeAndSumAgreeWithinTheirErrors) {
   const TriangleMesh mesh =
       without(sphere_mesh(3, 5, {0.1, 0.2, 0.3}), [](const Vec3& p) { return p.z > 1; });
-  const SolidAngleTree tree(mesh.points, mesh.triangles, mesh.triangles, best_cpu_level());
+  const voxelization::SolidAngleTree tree(mesh.points, mesh.triangles, mesh.triangles,
+                                          best_cpu_level());
   std::mt19937 random(5);
   std::uniform_real_distribution<double> place(-30, 30), small(-1, 1);
   double largest = 0;
@@ -192,10 +198,10 @@ TEST(SolidAngleTree, TreeAndSumAgreeWithinTheirErrors) {
     const double exact = winding_number(mesh, p);
     EXPECT_NEAR(tree.exact_at(p), exact, 1e-12);
     EXPECT_NEAR(tree.at(p, 0).value, exact, 1e-12);
-    const WindingSum rough = tree.at(p, 1e-3);
+    const voxelization::WindingSum rough = tree.at(p, 1e-3);
     EXPECT_LE(std::fabs(rough.value - exact), rough.error + 1e-13);
     largest = test::larger(largest, std::fabs(rough.value - exact));
-    const WindingSum range = tree.within(p, 2);
+    const voxelization::WindingSum range = tree.within(p, 2);
     bounded += range.error < 1;
     for (int m = 0; m < 20; ++m) {
       const Vec3 q = p + Vec3{small(random), small(random), small(random)};
@@ -209,10 +215,10 @@ TEST(SolidAngleTree, TreeAndSumAgreeWithinTheirErrors) {
 TEST(SolidAngleTree, AnglesAreThoseOfTheLibrary) {
   for (int n = 0; n <= 100000; ++n) {
     const double angle = n * 1e-5 * std::acos(-1.0), y = std::fabs(std::sin(angle));
-    EXPECT_NEAR(angle_of(std::cos(angle), y), std::atan2(y, std::cos(angle)), 1e-15);
+    EXPECT_NEAR(voxelization::angle_of(std::cos(angle), y), std::atan2(y, std::cos(angle)), 1e-15);
   }
-  EXPECT_EQ(angle_of(0, 0), 0);
-  EXPECT_EQ(angle_of(2, 0), 0);
+  EXPECT_EQ(voxelization::angle_of(0, 0), 0);
+  EXPECT_EQ(voxelization::angle_of(2, 0), 0);
 }
 
 TEST(OrientedSurface, ConesCloseAnyChain) {
@@ -224,7 +230,7 @@ TEST(OrientedSurface, ConesCloseAnyChain) {
     for (Triangle& t : mesh.triangles)
       if (random() % 3 == 0)
         std::swap(t[0], t[1]);
-    const ClosingCones closing = closing_cones(mesh.points, mesh.triangles);
+    const repair::ClosingCones closing = repair::closing_cones(mesh.points, mesh.triangles);
     EXPECT_FALSE(closing.cones.empty());
     EXPECT_GE(closing.pieces.size(), closing.cones.size());
     for (const auto* added : {&closing.cones, &closing.pieces}) {
@@ -245,19 +251,23 @@ TEST(VoxelizeRules, SamplesAreCountedForEachRule) {
   append(mesh, turned(sphere_mesh(1, 20, {-40, 0, 0})));
   rotate(mesh, 1);
   for (const int n : {2, 3}) {
-    const auto parity = scan_inside(Context{}, mesh, uniform_transform(2), {.samples = n});
-    const auto winding = scan_inside(Context{}, mesh, uniform_transform(2),
-                                     {.rule = VoxelRule::winding, .samples = n});
-    const auto zbuffer = scan_inside(Context{}, mesh, uniform_transform(2),
-                                     {.rule = VoxelRule::zbuffer, .samples = n});
+    const auto parity =
+        voxelization::scan_inside(Context{}, mesh, volume::uniform_transform(2), {.samples = n});
+    const auto winding =
+        voxelization::scan_inside(Context{}, mesh, volume::uniform_transform(2),
+                                  {.rule = voxelization::VoxelRule::winding, .samples = n});
+    const auto zbuffer =
+        voxelization::scan_inside(Context{}, mesh, volume::uniform_transform(2),
+                                  {.rule = voxelization::VoxelRule::zbuffer, .samples = n});
     const TriangleMesh hull = [&] {
       TriangleMesh outer = mesh;
       outer.triangles.resize(320);
       return outer;
     }();
-    const auto filled = scan_inside(Context{}, hull, uniform_transform(2), {.samples = n});
+    const auto filled =
+        voxelization::scan_inside(Context{}, hull, volume::uniform_transform(2), {.samples = n});
     EXPECT_NE(parity.counts, filled.counts);
-    for (const InsideScan* scan : {&winding, &zbuffer}) { // both fill the hollow
+    for (const voxelization::InsideScan* scan : {&winding, &zbuffer}) { // both fill the hollow
       EXPECT_EQ(scan->samples, n);
       EXPECT_EQ(scan->origins, filled.origins);
       EXPECT_EQ(scan->counts, filled.counts);
@@ -306,7 +316,7 @@ TEST(VoxelizeZbuffer, IsTheRuleBitForBit) {
       p = {std::round(p.x), std::round(p.y), std::round(p.z)};
     if (n >= 9)
       mesh.triangles.resize(mesh.triangles.size() * 3 / 4);
-    const auto inside = voxels(mesh, VoxelRule::zbuffer);
+    const auto inside = voxels(mesh, voxelization::VoxelRule::zbuffer);
     std::size_t expected = 0;
     for (std::int32_t i = -11; i <= 11; ++i)
       for (std::int32_t j = -11; j <= 11; ++j)
@@ -322,12 +332,12 @@ TEST(VoxelizeZbuffer, IsTheRuleBitForBit) {
 
 TEST(VoxelizeZbuffer, ConvexBodiesAreExactAndHollowsAreFilled) {
   const TriangleMesh ball = sphere_mesh(4, 40, {0.1, 0.2, 0.3});
-  const auto exact = voxels(ball, VoxelRule::parity);
-  EXPECT_EQ(voxels(ball, VoxelRule::zbuffer), exact);
+  const auto exact = voxels(ball, voxelization::VoxelRule::parity);
+  EXPECT_EQ(voxels(ball, voxelization::VoxelRule::zbuffer), exact);
   TriangleMesh hollow = ball;
   append(hollow, turned(sphere_mesh(4, 28, {0.1, 0.2, 0.3})));
-  const auto parity = voxels(hollow, VoxelRule::parity);
-  const auto zbuffer = voxels(hollow, VoxelRule::zbuffer);
+  const auto parity = voxels(hollow, voxelization::VoxelRule::parity);
+  const auto zbuffer = voxels(hollow, voxelization::VoxelRule::zbuffer);
   EXPECT_EQ(zbuffer, exact); // the whole hollow is missed
   const double missed =
       static_cast<double>(zbuffer.size() - parity.size()) / static_cast<double>(zbuffer.size());
@@ -343,7 +353,8 @@ TEST(VoxelizeZbuffer, BuffersBeyondTheLimitAreRefusedWithTheNumber) {
   context.max_memory = std::uint64_t{100} << 20;
   const TriangleMesh needle = box_mesh({0, 0, 0}, {90000, 1, 90000});
   try {
-    scan_inside(context, needle, uniform_transform(10), {.rule = VoxelRule::zbuffer});
+    voxelization::scan_inside(context, needle, volume::uniform_transform(10),
+                              {.rule = voxelization::VoxelRule::zbuffer});
     FAIL() << "no limit was found";
   } catch (const Error& error) {
     EXPECT_NE(std::string(error.what()).find("needs"), std::string::npos) << error.what();

@@ -18,7 +18,7 @@
 #include <utility>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::test {
 namespace {
 
 /// A cube of edge 2 at a place whose digits need doubles: two squares (below and above), a strip
@@ -83,7 +83,7 @@ std::string vtp(const Cube& cube, const test::VtkStyle& style) {
 }
 
 std::string complaint(const std::string& bytes) {
-  return test::complaint([&] { return read_vtp(bytes, "m"); });
+  return test::complaint([&] { return formats::read_vtp(bytes, "m"); });
 }
 
 std::string replaced(std::string text, const std::string& from, const std::string& to) {
@@ -103,10 +103,10 @@ TEST(Vtp, HoweverItIsStored) {
   for (const test::VtkStyle& style : all_styles())
     for (const bool strip : {false, true}) {
       const std::string bytes = vtp({.strip = strip}, style);
-      EXPECT_EQ(kind_from_magic(bytes.substr(0, 4096)), Kind::vtp);
+      EXPECT_EQ(formats::kind_from_magic(bytes.substr(0, 4096)), formats::Kind::vtp);
       ASSERT_EQ(complaint(bytes), "") << bytes.substr(0, 600);
-      VtpStats stats;
-      const TriangleMesh mesh = read_vtp(bytes, "m", &stats);
+      formats::VtpStats stats;
+      const TriangleMesh mesh = formats::read_vtp(bytes, "m", &stats);
       EXPECT_EQ(mesh.points, corners);
       EXPECT_EQ(mesh.triangles.size(), 12U);
       EXPECT_NEAR(signed_volume(mesh), 8, 1e-14);
@@ -119,7 +119,8 @@ TEST(Vtp, HoweverItIsStored) {
 
 TEST(Vtp, PartsMaterialsAndTexture) {
   for (const test::VtkStyle& style : all_styles()) {
-    const TriangleMesh mesh = read_vtp(vtp({.numbers = true, .texture = true}, style), "m");
+    const TriangleMesh mesh =
+        formats::read_vtp(vtp({.numbers = true, .texture = true}, style), "m");
     ASSERT_EQ(mesh.part.size(), 12U);
     ASSERT_EQ(mesh.material.size(), 12U);
     ASSERT_EQ(mesh.texcoords.size(), 12U);
@@ -154,7 +155,7 @@ TEST(Vtp, DamageIsSeenOrHarmless) {
       for (int k = 0; k < 1 + n % 3; ++k)
         damaged[random() % damaged.size()] = static_cast<char>(random());
       try {
-        check_mesh(read_vtp(damaged, "m"));
+        check_mesh(formats::read_vtp(damaged, "m"));
       } catch (const Error&) { // what damage is for
       }
     }
@@ -221,10 +222,10 @@ TEST(Vtp, HugeClaimsCostNothing) {
 }
 
 TEST(Vtp, IsAKindOfMesh) {
-  EXPECT_EQ(kind_from_suffix("a.VTP"), Kind::vtp);
-  EXPECT_EQ(kind_from_name("vtp"), Kind::vtp);
-  EXPECT_EQ(std::ranges::count(readable_mesh_kinds(), Kind::vtp), 1);
+  EXPECT_EQ(formats::kind_from_suffix("a.VTP"), formats::Kind::vtp);
+  EXPECT_EQ(formats::kind_from_name("vtp"), formats::Kind::vtp);
+  EXPECT_EQ(std::ranges::count(formats::readable_mesh_kinds(), formats::Kind::vtp), 1);
 }
 
 } // namespace
-} // namespace gewebe
+} // namespace gewebe::test

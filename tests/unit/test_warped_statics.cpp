@@ -28,30 +28,30 @@
 #include <string>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::test {
 namespace {
 
 /// A bar 40 × 8 × 8 mm along x, held at x = 0.
-Model bar(double young = 2e4, double density = 1e-3) {
-  TetMesh mesh = test::box_tetrahedra(10, 2, 2, 4);
-  SolidModelOptions options;
+model::Model bar(double young = 2e4, double density = 1e-3) {
+  tetrahedra::TetMesh mesh = test::box_tetrahedra(10, 2, 2, 4);
+  fem::SolidModelOptions options;
   options.material.materials = {{"gel", density, young, 1, 0.2, 0.45}};
-  Model model = solid_model(std::move(mesh), options, {});
-  for (Node& node : model.nodes)
+  model::Model model = fem::solid_model(std::move(mesh), options, {});
+  for (model::Node& node : model.nodes)
     if (node.position.x == 0)
-      node.fixed = fixed_all;
+      node.fixed = model::fixed_all;
   return model;
 }
 
-std::vector<std::uint32_t> where(const Model& model, auto&& is) {
+std::vector<std::uint32_t> where(const model::Model& model, auto&& is) {
   std::vector<std::uint32_t> nodes;
-  for (std::uint32_t i = 0; i < surface_count(model); ++i)
+  for (std::uint32_t i = 0; i < model::surface_count(model); ++i)
     if (is(model.nodes[i].position))
       nodes.push_back(i);
   return nodes;
 }
 
-std::vector<std::uint32_t> end_of(const Model& model) {
+std::vector<std::uint32_t> end_of(const model::Model& model) {
   return where(model, [](const Vec3& p) { return p.x > 40 - 1e-9; });
 }
 
@@ -66,16 +66,16 @@ double largest(std::span<const double> values) {
 struct Reference {
   std::vector<double> u;
   std::vector<double> forces; ///< that hold, by axis
-  explicit Reference(const Model& model, const Load& load) {
-    const TetMesh mesh = element_mesh(model);
-    const auto materials = element_materials(model);
-    const auto elements = solid_elements(mesh, materials);
+  explicit Reference(const model::Model& model, const contact::Load& load) {
+    const tetrahedra::TetMesh mesh = fem::element_mesh(model);
+    const auto materials = fem::element_materials(model);
+    const auto elements = fem::solid_elements(mesh, materials);
     std::vector<std::uint8_t> fixed(3 * model.nodes.size());
     std::vector<double> prescribed(fixed.size());
-    SolidVector f = hyperelastic_weight(mesh, materials, elements, load.gravity);
+    fit::SolidVector f = fit::hyperelastic_weight(mesh, materials, elements, load.gravity);
     for (std::uint32_t i = 0; i < model.nodes.size(); ++i)
       for (int a = 0; a < 3; ++a)
-        fixed[axis_of(i, a)] = is_fixed(model, i, a) ? 1 : 0;
+        fixed[axis_of(i, a)] = contact::is_fixed(model, i, a) ? 1 : 0;
     for (const auto& [node, d] : load.displacement)
       for (int a = 0; a < 3; ++a) {
         fixed[axis_of(node, a)] = 1;
@@ -84,17 +84,17 @@ struct Reference {
     for (const auto& [node, force] : load.force)
       for (int a = 0; a < 3; ++a)
         f.axes[axis_of(node, a)] += force[a];
-    const auto found = hyperelastic_statics(mesh, elements, fixed, prescribed, f);
+    const auto found = fit::hyperelastic_statics(mesh, elements, fixed, prescribed, f);
     u = found.displacement.axes;
-    forces = hyperelastic_forces(mesh, elements, found.displacement).axes;
+    forces = fit::hyperelastic_forces(mesh, elements, found.displacement).axes;
     for (std::size_t k = 0; k < forces.size(); ++k)
       forces[k] = -forces[k] - f.axes[k];
   }
 };
 
 TEST(WarpedStatics, UnderSmallLoadsItIsTheLinearMethod) {
-  const Model model = bar();
-  Load load;
+  const model::Model model = bar();
+  contact::Load load;
   load.gravity = {0, 1, -2};
   for (const std::uint32_t node : end_of(model))
     load.force[node] = {0, 0.3, -0.5};
@@ -103,14 +103,14 @@ TEST(WarpedStatics, UnderSmallLoadsItIsTheLinearMethod) {
   for (const std::uint32_t node : held)
     load.displacement[node] = {1e-5, 0, 2e-5};
   ASSERT_FALSE(held.empty());
-  Elastostatic linear(model, nullptr, test::one_thread());
-  WarpedStatics warped(model, nullptr, test::one_thread());
+  statics::Elastostatic linear(model, nullptr, test::one_thread());
+  statics::WarpedStatics warped(model, nullptr, test::one_thread());
   linear.update(load);
   warped.update(load);
-  EXPECT_LE(
-      test::relative_difference(warped.surface_displacement(),
-                                linear.surface_displacement().first(3 * surface_count(model))),
-      1e-3);
+  EXPECT_LE(test::relative_difference(
+                warped.surface_displacement(),
+                linear.surface_displacement().first(3 * model::surface_count(model))),
+            1e-3);
   EXPECT_LE(test::relative_difference(warped.displacement(), linear.displacement()), 1e-3);
   EXPECT_LE(test::relative_difference(warped.local_displacement(), linear.displacement()), 1e-3);
   const auto forces = warped.holding_forces();
@@ -125,16 +125,16 @@ TEST(WarpedStatics, UnderSmallLoadsItIsTheLinearMethod) {
 /// Bent by some 30 degrees by its weight, a force on its end by columns and by a solution, an end
 /// that is moved.
 TEST(WarpedStatics, LargeShapesAreNearHyperelasticOnes) {
-  const Model model = bar();
+  const model::Model model = bar();
   const auto end = end_of(model);
-  Load few, held;
+  contact::Load few, held;
   for (const std::uint32_t node : end)
     few.force[node] = {0, 0, -3e3 / static_cast<double>(end.size())};
-  Load many = few;
-  for (std::uint32_t i = 0; i < surface_count(model) && many.force.size() <= 64; ++i)
+  contact::Load many = few;
+  for (std::uint32_t i = 0; i < model::surface_count(model) && many.force.size() <= 64; ++i)
     if (model.nodes[i].fixed == 0)
       many.force.emplace(i, Vec3{});
-  Load heavy = few;
+  contact::Load heavy = few;
   heavy.gravity = {0, 0, -2000};
   for (const std::uint32_t node : end)
     if (std::abs(model.nodes[node].position.y - 4) < 1 &&
@@ -144,13 +144,13 @@ TEST(WarpedStatics, LargeShapesAreNearHyperelasticOnes) {
   ASSERT_FALSE(held.displacement.empty());
   struct Case {
     const char* what;
-    const Load& load;
+    const contact::Load& load;
     double error;
   };
   for (const Case& c : {Case{"few", few, 0.02}, Case{"many", many, 0.02},
                         Case{"heavy", heavy, 0.03}, Case{"held", held, 0.03}}) {
-    WarpedStatics warped(model, nullptr, test::one_thread());
-    Elastostatic linear(model, nullptr, test::one_thread());
+    statics::WarpedStatics warped(model, nullptr, test::one_thread());
+    statics::Elastostatic linear(model, nullptr, test::one_thread());
     warped.update(c.load);
     linear.update(c.load);
     const Reference expected(model, c.load);
@@ -160,7 +160,7 @@ TEST(WarpedStatics, LargeShapesAreNearHyperelasticOnes) {
     for (const auto& [node, d] : c.load.displacement)
       EXPECT_EQ(vector_at(warped.displacement(), node), d);
     Vec3 force, other;
-    for (const NodeVector& f : warped.holding_forces()) {
+    for (const contact::NodeVector& f : warped.holding_forces()) {
       force += f.value;
       other += vector_at(expected.forces, f.node);
     }
@@ -170,24 +170,24 @@ TEST(WarpedStatics, LargeShapesAreNearHyperelasticOnes) {
 
 /// Strains in frames that turn are those in space, turned.
 TEST(WarpedStatics, StressesTurnWithTheirFrames) {
-  const Model model = bar();
-  const TetMesh mesh = element_mesh(model);
-  const auto materials = element_materials(model);
-  const auto elements = solid_elements(mesh, materials);
+  const model::Model model = bar();
+  const tetrahedra::TetMesh mesh = fem::element_mesh(model);
+  const auto materials = fem::element_materials(model);
+  const auto elements = fem::solid_elements(mesh, materials);
   const Eigen::Vector3d w(0.3, -1.1, 0.6);
   std::vector<double> strained, turned;
-  for (const Node& node : model.nodes) {
+  for (const model::Node& node : model.nodes) {
     const Vec3 p = node.position;
     const Vec3 e{0.02 * p.x + 0.01 * p.y, 0.01 * p.x - 0.03 * p.y, 0.015 * p.z};
     const Eigen::Vector3d r = w.cross(Eigen::Vector3d(p.x, p.y, p.z));
     strained.insert(strained.end(), {e.x, e.y, e.z});
     turned.insert(turned.end(), {e.x + r.x(), e.y + r.y(), e.z + r.z()});
   }
-  const SolidFields rest = solid_fields(mesh, materials, elements, strained),
-                    found =
-                        solid_fields(mesh, materials, elements, turned, {}, StrainFrames::turning);
+  const fem::SolidFields rest = fem::solid_fields(mesh, materials, elements, strained),
+                         found = fem::solid_fields(mesh, materials, elements, turned, {},
+                                                   fem::StrainFrames::turning);
   const Eigen::Matrix3d r = Eigen::AngleAxisd(w.norm(), w.normalized()).toRotationMatrix();
-  const auto matrix = [](const SymmetricBlock& s) {
+  const auto matrix = [](const linalg::SymmetricBlock& s) {
     Eigen::Matrix3d m;
     m << s[0], s[1], s[2], s[1], s[3], s[4], s[2], s[4], s[5];
     return m;
@@ -195,8 +195,8 @@ TEST(WarpedStatics, StressesTurnWithTheirFrames) {
   for (std::size_t i = 0; i < model.nodes.size(); ++i) {
     const Eigen::Matrix3d expected = r * matrix(rest.node_stress[i]) * r.transpose();
     EXPECT_LE((matrix(found.node_stress[i]) - expected).norm(), 1e-9 * expected.norm());
-    EXPECT_NEAR(von_mises(found.node_stress[i]), von_mises(rest.node_stress[i]),
-                1e-9 * von_mises(rest.node_stress[i]));
+    EXPECT_NEAR(fem::von_mises(found.node_stress[i]), fem::von_mises(rest.node_stress[i]),
+                1e-9 * fem::von_mises(rest.node_stress[i]));
   }
   for (std::size_t t = 0; t < elements.size(); ++t)
     EXPECT_LE((matrix(found.element_strain[t]) - r * matrix(rest.element_strain[t]) * r.transpose())
@@ -219,22 +219,22 @@ TEST(WarpedStatics, AnInstrumentPressesTheBarDown) {
   for (const double z : {13.0, 9.0, 4.0, 0.0}) {
     pressed.press(z);
     const std::vector<double> u = pressed.shape();
-    const Simulation& scene = pressed.scene();
+    const scene::Simulation& scene = pressed.scene();
     EXPECT_GT(scene.instrument(0).nodes, 0U);
     Vec3 sum;
-    Load load;
+    contact::Load load;
     const std::span<const double> shown = scene.displacement(0);
     EXPECT_TRUE(std::ranges::equal(u, shown.first(u.size()))) << "one shape, read in two ways";
     EXPECT_NEAR(test::surface_depth(pressed.model(), shown, {6, {}, 0}, {{36, 4, z}, {}}), 0,
                 test::depth_allowed);
     // No friction: all forces pass through the centre.
     EXPECT_LE(norm(scene.instrument(0).torque), 1e-6 * 6 * norm(scene.instrument(0).force));
-    for (const NodeVector& f : scene.contact_forces(0)) {
+    for (const contact::NodeVector& f : scene.contact_forces(0)) {
       sum += f.value;
       load.force[f.node] = f.value;
     }
     EXPECT_LE(norm(sum + scene.instrument(0).force), 1e-9 * norm(sum));
-    for (std::uint32_t i = 0; i < surface_count(pressed.model()); ++i)
+    for (std::uint32_t i = 0; i < model::surface_count(pressed.model()); ++i)
       EXPECT_GE(norm(pressed.model().nodes[i].position + vector_at(u, i) - Vec3{36, 4, z}),
                 6 * (1 - test::depth_allowed));
     // These forces press a Neo-Hookean bar as far.
@@ -255,11 +255,11 @@ TEST(WarpedStatics, ThreadsDoNotMatterAndWhatIsTakenBackLeavesNoTrace) {
     with_error.press(z);
     (void)with_error.scene().displacement(0); // whoever looks inside changes nothing
     // A step that goes far and then fails.
-    with_error.scene().apply(SetGravity{{0, 0, -5000}});
-    with_error.scene().apply(SetForce{0, end_of(one.model()), {0, 0, 1e30}});
+    with_error.scene().apply(scene::SetGravity{{0, 0, -5000}});
+    with_error.scene().apply(scene::SetForce{0, end_of(one.model()), {0, 0, 1e30}});
     EXPECT_THROW(with_error.scene().step(0.01), Error);
-    with_error.scene().apply(SetGravity{{0, 0, 0}});
-    with_error.scene().apply(SetForce{0, end_of(one.model()), {}});
+    with_error.scene().apply(scene::SetGravity{{0, 0, 0}});
+    with_error.scene().apply(scene::SetForce{0, end_of(one.model()), {}});
     EXPECT_EQ(one.shape(), two.shape());
   }
   one.press(5);
@@ -271,7 +271,7 @@ TEST(WarpedStatics, ThreadsDoNotMatterAndWhatIsTakenBackLeavesNoTrace) {
 }
 
 /// On the surface, everywhere, and in frames that turn.
-std::vector<std::vector<double>> shapes_of(WarpedStatics& warped) {
+std::vector<std::vector<double>> shapes_of(statics::WarpedStatics& warped) {
   std::vector<std::vector<double>> all;
   for (const std::span<const double> u :
        {warped.surface_displacement(), warped.displacement(), warped.local_displacement()})
@@ -280,10 +280,10 @@ std::vector<std::vector<double>> shapes_of(WarpedStatics& warped) {
 }
 
 TEST(WarpedStatics, RestoreInvalidatesCachedShapes) {
-  const Model model = bar();
-  WarpedStatics warped(model, nullptr, test::one_thread());
+  const model::Model model = bar();
+  statics::WarpedStatics warped(model, nullptr, test::one_thread());
   const auto shown = [&](const Vec3& gravity) {
-    Load load;
+    contact::Load load;
     load.gravity = gravity;
     warped.update(load);
     return std::pair(warped.answer(), shapes_of(warped));
@@ -298,29 +298,29 @@ TEST(WarpedStatics, BadInputIsRefusedByName) {
   const auto message = [](auto&& act) {
     try {
       act();
-    } catch (const Error& error) {
+    } catch (const gewebe::Error& error) {
       return std::string(error.what());
     }
     return std::string();
   };
-  const Model model = bar();
-  WarpedStatics warped(model, nullptr, test::one_thread());
-  Load inside;
+  const model::Model model = bar();
+  statics::WarpedStatics warped(model, nullptr, test::one_thread());
+  contact::Load inside;
   inside.displacement[static_cast<std::uint32_t>(model.nodes.size() - 1)] = {1, 0, 0};
   EXPECT_NE(
       message([&] { warped.update(inside); }).find("is inside, expected nodes of the surface"),
       std::string::npos);
   EXPECT_EQ(message([&] {
-              const Model net = test::organ(3);
-              WarpedStatics(net, nullptr, test::one_thread());
+              const model::Model net = test::organ(3);
+              statics::WarpedStatics(net, nullptr, test::one_thread());
             }),
             "the model has no tetrahedra, expected a solid for rotation=warp");
   // It goes on as if nothing had been.
-  Load load;
+  contact::Load load;
   load.force[end_of(model)[0]] = {0, 0, -100};
   warped.update(load);
   EXPECT_GT(largest(warped.surface_displacement()), 0);
 }
 
 } // namespace
-} // namespace gewebe
+} // namespace gewebe::test

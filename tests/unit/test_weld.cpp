@@ -42,10 +42,10 @@ std::size_t open_edges(const TriangleMesh& mesh) {
   }));
 }
 
-WeldResult weld_mode(TriangleMesh& mesh, Weld mode) {
-  WeldOptions options;
+repair::WeldResult weld_mode(TriangleMesh& mesh, repair::Weld mode) {
+  repair::WeldOptions options;
   options.mode = mode;
-  return weld(mesh, options);
+  return repair::weld(mesh, options);
 }
 
 } // namespace
@@ -90,7 +90,7 @@ TEST(Weld, SoupBecomesACube) {
   TriangleMesh mesh;
   add_cube_soup(mesh, {}, 0);
   EXPECT_EQ(open_edges(mesh), 36u); // the negative control
-  const WeldResult result = weld_mode(mesh, Weld::borders);
+  const repair::WeldResult result = weld_mode(mesh, repair::Weld::borders);
   EXPECT_EQ(result.points_before, 36u);
   EXPECT_EQ(result.points_after, 8u);
   EXPECT_EQ(result.welded, 28u);
@@ -106,10 +106,10 @@ TEST(Weld, TouchingClosedPartsStayApart) {
   add_cube_soup(mesh, {0, 0, 0}, 0);
   add_cube_soup(mesh, {1, 0, 0}, 1); // four corners in common
   TriangleMesh by_part = mesh, all = mesh, none = mesh;
-  EXPECT_EQ(weld_mode(mesh, Weld::borders).points_after, 16u);
-  EXPECT_EQ(weld_mode(by_part, Weld::part).points_after, 16u);
-  EXPECT_EQ(weld_mode(all, Weld::all).points_after, 12u);
-  EXPECT_EQ(weld_mode(none, Weld::none).points_after, 72u);
+  EXPECT_EQ(weld_mode(mesh, repair::Weld::borders).points_after, 16u);
+  EXPECT_EQ(weld_mode(by_part, repair::Weld::part).points_after, 16u);
+  EXPECT_EQ(weld_mode(all, repair::Weld::all).points_after, 12u);
+  EXPECT_EQ(weld_mode(none, repair::Weld::none).points_after, 72u);
 }
 
 TEST(Weld, PatchesOfOneSurfaceJoinAtTheirBorders) {
@@ -130,14 +130,14 @@ TEST(Weld, PatchesOfOneSurfaceJoinAtTheirBorders) {
     mesh.points.push_back({p.x, p.y, 2 - p.z});
   add_cube_soup(mesh, {1, 0, 0}, 2);
   TriangleMesh by_part = mesh;
-  EXPECT_EQ(weld_mode(by_part, Weld::part).points_after, 24u);
+  EXPECT_EQ(weld_mode(by_part, repair::Weld::part).points_after, 24u);
   EXPECT_EQ(open_edges(by_part), 8u);
-  const WeldResult result = weld_mode(mesh, Weld::borders);
+  const repair::WeldResult result = weld_mode(mesh, repair::Weld::borders);
   EXPECT_EQ(result.points_after, 20u);
   EXPECT_EQ(result.welded_across_parts, 4u);
   EXPECT_EQ(open_edges(mesh), 0u);
   EXPECT_EQ(signed_volume(mesh), 3);
-  EXPECT_EQ(weld_mode(mesh, Weld::borders).welded, 0u); // again changes nothing
+  EXPECT_EQ(weld_mode(mesh, repair::Weld::borders).welded, 0u); // again changes nothing
 }
 
 TEST(Weld, SharedPointsStayShared) {
@@ -145,7 +145,7 @@ TEST(Weld, SharedPointsStayShared) {
   mesh.points = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {1, 1, 0}};
   mesh.triangles = {{0, 1, 2}, {2, 1, 3}};
   mesh.part = {0, 1};
-  EXPECT_EQ(weld_mode(mesh, Weld::part).points_after, 4u);
+  EXPECT_EQ(weld_mode(mesh, repair::Weld::part).points_after, 4u);
   EXPECT_EQ(mesh.triangles[1], (Triangle{2, 1, 3}));
 }
 
@@ -153,7 +153,7 @@ TEST(Weld, ZeroHasNoSign) {
   TriangleMesh mesh;
   mesh.points = {{0.0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {-0.0, 0, -0.0}, {0, 1, 0}, {-1, 0, 0}};
   mesh.triangles = {{0, 1, 2}, {3, 4, 5}};
-  EXPECT_EQ(weld_mode(mesh, Weld::borders).points_after, 4u);
+  EXPECT_EQ(weld_mode(mesh, repair::Weld::borders).points_after, 4u);
 }
 
 TEST(Weld, DegenerateTrianglesAndUnusedPoints) {
@@ -165,10 +165,10 @@ TEST(Weld, DegenerateTrianglesAndUnusedPoints) {
   mesh.material = {1, 2, 3};
   mesh.texcoords = {{1}, {2}, {3}};
   TriangleMesh kept = mesh;
-  WeldOptions options;
-  options.mode = Weld::all;
+  repair::WeldOptions options;
+  options.mode = repair::Weld::all;
   options.drop_unused = true;
-  const WeldResult result = weld(mesh, options);
+  const repair::WeldResult result = repair::weld(mesh, options);
   EXPECT_EQ(result.degenerate_removed, 1u);
   EXPECT_EQ(result.unused_removed, 2u);
   EXPECT_EQ(result.welded, 1u);
@@ -180,7 +180,7 @@ TEST(Weld, DegenerateTrianglesAndUnusedPoints) {
   EXPECT_EQ(mesh.texcoords[1][0], 3);
 
   options.drop_degenerate = options.drop_unused = false;
-  EXPECT_EQ(weld(kept, options).points_after, 5u);
+  EXPECT_EQ(repair::weld(kept, options).points_after, 5u);
   EXPECT_EQ(kept.triangles.size(), 3u);
   EXPECT_EQ(kept.points[0], (Vec3{9, 9, 9}));
 }
@@ -199,7 +199,7 @@ Vec3 area_vector(const std::vector<Vec3>& polygon, const std::vector<Triangle>& 
 // n - 2 triangles, all turned like the polygon, which together have its area: a triangulation.
 void expect_triangulation(const std::vector<Vec3>& polygon, Vec3 normal, double area) {
   std::vector<Triangle> triangles;
-  triangulate_polygon(polygon, triangles);
+  mesh::triangulate_polygon(polygon, triangles);
   ASSERT_EQ(triangles.size(), polygon.size() - 2);
   double sum = 0;
   for (const Triangle& t : triangles) {
@@ -214,7 +214,8 @@ void expect_triangulation(const std::vector<Vec3>& polygon, Vec3 normal, double 
 
 TEST(Triangulate, ConvexIsAFan) {
   std::vector<Triangle> triangles;
-  triangulate_polygon(std::vector<Vec3>{{0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {0, 1, 0}}, triangles);
+  mesh::triangulate_polygon(std::vector<Vec3>{{0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {0, 1, 0}},
+                            triangles);
   EXPECT_EQ(triangles, (std::vector<Triangle>{{0, 1, 2}, {0, 2, 3}}));
 }
 
@@ -254,7 +255,7 @@ TEST(Triangulate, ConcaveInEveryPlaneAndOrientation) {
 TEST(Triangulate, CollinearCornersAreUsed) {
   const std::vector<Vec3> polygon{{0, 0, 0}, {1, 0, 0}, {2, 0, 0}, {2, 1, 0}, {2, 2, 0}, {0, 2, 0}};
   std::vector<Triangle> triangles;
-  triangulate_polygon(polygon, triangles);
+  mesh::triangulate_polygon(polygon, triangles);
   ASSERT_EQ(triangles.size(), 4u);
   std::set<std::uint32_t> used;
   for (const Triangle& t : triangles) {
@@ -299,10 +300,13 @@ TEST(Triangulate, RandomStarsAndGridPolygons) {
 
 TEST(Triangulate, WithoutAreaOrTooLarge) {
   std::vector<Triangle> triangles;
-  triangulate_polygon(std::vector<Vec3>(7, Vec3{1, 1, 1}), triangles);
+  mesh::triangulate_polygon(std::vector<Vec3>(7, Vec3{1, 1, 1}), triangles);
   EXPECT_EQ(triangles.size(), 5u);
   triangles.clear();
-  triangulate_polygon(std::vector<Vec3>{{0, 0, 0}, {1, 1, 0}, {1, 0, 0}, {0, 1, 0}}, triangles);
+  mesh::triangulate_polygon(std::vector<Vec3>{{0, 0, 0}, {1, 1, 0}, {1, 0, 0}, {0, 1, 0}},
+                            triangles);
   EXPECT_EQ(triangles.size(), 2u);
-  EXPECT_THROW(triangulate_polygon(std::vector<Vec3>(max_polygon_corners + 1), triangles), Error);
+  EXPECT_THROW(
+      mesh::triangulate_polygon(std::vector<Vec3>(mesh::max_polygon_corners + 1), triangles),
+      Error);
 }

@@ -19,8 +19,8 @@ namespace {
 
 /// A bar of 80 x 20 x 20 along x, held at x = 0; its second half is of another material.
 test::Solid bar(double first, double second, std::uint32_t across = 2,
-                const HyperelasticLaw& law = {}) {
-  TetMesh mesh = test::box_tetrahedra(4 * across, across, across, 20.0 / across);
+                const model::HyperelasticLaw& law = {}) {
+  tetrahedra::TetMesh mesh = test::box_tetrahedra(4 * across, across, across, 20.0 / across);
   mesh.material.clear();
   for (const Tetrahedron& t : mesh.tetrahedra) {
     double x = 0;
@@ -37,14 +37,15 @@ test::Solid bar(double first, double second, std::uint32_t across = 2,
 const std::vector<std::string> names{"soft", "stiff"};
 const std::vector<std::size_t> both{0, 1};
 
-SolidVector weight(const test::Solid& s, double acceleration) {
-  return hyperelastic_weight(s.mesh, s.materials, s.elements, {0, 0, -acceleration});
+fit::SolidVector weight(const test::Solid& s, double acceleration) {
+  return fit::hyperelastic_weight(s.mesh, s.materials, s.elements, {0, 0, -acceleration});
 }
 
 /// What is measured on the body under its weight, at its upper edge and 4 mm off its end.
-MeasuredCase measured(const test::Solid& s, double acceleration, double noise) {
-  MeasuredCase c{weight(s, acceleration), {}};
-  const auto u = hyperelastic_statics(s.mesh, s.elements, s.fixed, {}, c.load).displacement.axes;
+fit::MeasuredCase measured(const test::Solid& s, double acceleration, double noise) {
+  fit::MeasuredCase c{weight(s, acceleration), {}};
+  const auto u =
+      fit::hyperelastic_statics(s.mesh, s.elements, s.fixed, {}, c.load).displacement.axes;
   std::mt19937 random(7);
   std::normal_distribution<double> normal(0, noise);
   for (const Vec3 place : {Vec3{20, 10, 20},
@@ -54,8 +55,8 @@ MeasuredCase measured(const test::Solid& s, double acceleration, double noise) {
                            {80, 10, 20},
                            {84, 10, 10},
                            {51, 7, 3}}) {
-    const Vec3 d = displacement_at(find_place(s.mesh, place), u);
-    Measurement m{place, {}, "point " + std::to_string(c.measurements.size())};
+    const Vec3 d = embedding::displacement_at(embedding::find_place(s.mesh, place), u);
+    fit::Measurement m{place, {}, "point " + std::to_string(c.measurements.size())};
     for (int i = 0; i < 3; ++i)
       m.displacement[static_cast<std::size_t>(i)] = d[i] + normal(random);
     c.measurements.push_back(m);
@@ -64,10 +65,10 @@ MeasuredCase measured(const test::Solid& s, double acceleration, double noise) {
 }
 
 /// The message of what fit_young throws.
-std::string refusal(const test::Solid& s, const MeasuredCase& c,
+std::string refusal(const test::Solid& s, const fit::MeasuredCase& c,
                     std::span<const std::size_t> wanted = both) {
   try {
-    fit_young(s.mesh, s.materials, names, wanted, s.fixed, std::span(&c, 1));
+    fit::fit_young(s.mesh, s.materials, names, wanted, s.fixed, std::span(&c, 1));
   } catch (const Error& error) {
     return error.place() + (error.place().empty() ? "" : ": ") + error.what();
   }
@@ -83,14 +84,14 @@ TEST(SolidPlace, FollowsLinearFieldsInsideAndOff) {
     for (const double v : {1 + 0.1 * p.x, 0.2 * p.y - 0.3 * p.z, 0.5 * p.x})
       u.push_back(v);
   for (const Vec3& p : {Vec3{33, 7, 11}, {86, 10, 4}, {-3, -2, 22}, {0, 0, 0}}) {
-    const Vec3 d = displacement_at(find_place(s.mesh, p), u);
+    const Vec3 d = embedding::displacement_at(embedding::find_place(s.mesh, p), u);
     EXPECT_NEAR(d.x, 1 + 0.1 * p.x, 1e-12);
     EXPECT_NEAR(d.y, 0.2 * p.y - 0.3 * p.z, 1e-12);
     EXPECT_NEAR(d.z, 0.5 * p.x, 1e-12);
   }
-  EXPECT_NEAR(find_place(s.mesh, {86, 10, 4}).outside, 6, 1e-12);
-  EXPECT_NEAR(find_place(s.mesh, {-3, -4, 10}).outside, 5, 1e-12);
-  EXPECT_EQ(find_place(s.mesh, {33, 7, 11}).outside, 0);
+  EXPECT_NEAR(embedding::find_place(s.mesh, {86, 10, 4}).outside, 6, 1e-12);
+  EXPECT_NEAR(embedding::find_place(s.mesh, {-3, -4, 10}).outside, 5, 1e-12);
+  EXPECT_EQ(embedding::find_place(s.mesh, {33, 7, 11}).outside, 0);
 }
 
 TEST(SolidPlace, FollowsQuadraticFieldsInside) {
@@ -99,7 +100,7 @@ TEST(SolidPlace, FollowsQuadraticFieldsInside) {
   for (const Vec3& p : s.mesh.points)
     for (const double v : {p.x * p.y, p.z * p.z, p.x * p.x - p.y * p.z})
       u.push_back(v);
-  const Vec3 p{33, 7, 11}, d = displacement_at(find_place(s.mesh, p), u);
+  const Vec3 p{33, 7, 11}, d = embedding::displacement_at(embedding::find_place(s.mesh, p), u);
   EXPECT_NEAR(d.x, p.x * p.y, 1e-9);
   EXPECT_NEAR(d.y, p.z * p.z, 1e-9);
   EXPECT_NEAR(d.z, p.x * p.x - p.y * p.z, 1e-9);
@@ -108,10 +109,10 @@ TEST(SolidPlace, FollowsQuadraticFieldsInside) {
 TEST(YoungFit, FindsWhatMadeTheDisplacements) {
   test::Solid truth = bar(8000, 20000);
   // 27 mm of 80: far beyond small strains.
-  const MeasuredCase c = measured(truth, 9810, 0);
+  const fit::MeasuredCase c = measured(truth, 9810, 0);
   const test::Solid start = bar(50000, 10000);
-  const YoungFit fit = fit_young(start.mesh, start.materials, names, both, start.fixed,
-                                 std::span(&c, 1), {.tolerance = 1e-6});
+  const fit::YoungFit fit = fit::fit_young(start.mesh, start.materials, names, both, start.fixed,
+                                           std::span(&c, 1), {.tolerance = 1e-6});
   EXPECT_NEAR(fit.materials[0].young, 8000, 8e-4 * 8000);
   EXPECT_NEAR(fit.materials[1].young, 20000, 8e-4 * 20000);
   EXPECT_LE(fit.solves, 10);
@@ -120,12 +121,13 @@ TEST(YoungFit, FindsWhatMadeTheDisplacements) {
 }
 
 TEST(YoungFit, FindsModuliUnderTheLawsOfMaterials) {
-  for (const HyperelasticLaw& law : {HyperelasticLaw{HyperelasticLaw::yeoh, {0.5, 0.1}},
-                                     HyperelasticLaw{HyperelasticLaw::ogden, {6}}}) {
-    const MeasuredCase c = measured(bar(8000, 20000, 1, law), 9810, 0);
+  for (const model::HyperelasticLaw& law :
+       {model::HyperelasticLaw{model::HyperelasticLaw::yeoh, {0.5, 0.1}},
+        model::HyperelasticLaw{model::HyperelasticLaw::ogden, {6}}}) {
+    const fit::MeasuredCase c = measured(bar(8000, 20000, 1, law), 9810, 0);
     const test::Solid start = bar(50000, 10000, 1, law);
-    const YoungFit fit = fit_young(start.mesh, start.materials, names, both, start.fixed,
-                                   std::span(&c, 1), {.tolerance = 1e-6});
+    const fit::YoungFit fit = fit::fit_young(start.mesh, start.materials, names, both, start.fixed,
+                                             std::span(&c, 1), {.tolerance = 1e-6});
     EXPECT_NEAR(fit.materials[0].young, 8000, 8e-4 * 8000);
     EXPECT_NEAR(fit.materials[1].young, 20000, 8e-4 * 20000);
     EXPECT_LT(fit.residual, 1e-4 * fit.measured);
@@ -133,11 +135,11 @@ TEST(YoungFit, FindsModuliUnderTheLawsOfMaterials) {
 }
 
 TEST(YoungFit, OfOneMaterialTakesTheOtherAsKnown) {
-  const MeasuredCase c = measured(bar(8000, 20000), 9810, 0);
+  const fit::MeasuredCase c = measured(bar(8000, 20000), 9810, 0);
   const test::Solid start = bar(8000, 900);
   const std::array<std::size_t, 1> second{1};
-  const YoungFit fit =
-      fit_young(start.mesh, start.materials, names, second, start.fixed, std::span(&c, 1));
+  const fit::YoungFit fit =
+      fit::fit_young(start.mesh, start.materials, names, second, start.fixed, std::span(&c, 1));
   ASSERT_EQ(fit.materials.size(), 1u);
   EXPECT_EQ(fit.materials[0].material, 1u);
   EXPECT_NEAR(fit.materials[0].young, 20000, 200);
@@ -146,7 +148,7 @@ TEST(YoungFit, OfOneMaterialTakesTheOtherAsKnown) {
 // Intervals of repeated noise hold the truth about as often as they say.
 TEST(YoungFit, IsAsSureAsItSays) {
   const test::Solid truth = bar(30000, 30000, 1);
-  const MeasuredCase exact = measured(truth, 2000, 0);
+  const fit::MeasuredCase exact = measured(truth, 2000, 0);
   std::mt19937 random(3);
   std::normal_distribution<double> normal(0, 0.05);
   const std::array<std::size_t, 1> first{0};
@@ -154,12 +156,12 @@ TEST(YoungFit, IsAsSureAsItSays) {
   constexpr int runs = 60;
   double widest = 0;
   for (int run = 0; run < runs; ++run) {
-    MeasuredCase c = exact;
-    for (Measurement& m : c.measurements)
+    fit::MeasuredCase c = exact;
+    for (fit::Measurement& m : c.measurements)
       for (auto& d : m.displacement)
         *d += normal(random);
-    const YoungFit fit =
-        fit_young(truth.mesh, truth.materials, names, first, truth.fixed, std::span(&c, 1));
+    const fit::YoungFit fit =
+        fit::fit_young(truth.mesh, truth.materials, names, first, truth.fixed, std::span(&c, 1));
     const auto [low, high] = fit.materials[0].interval.value();
     held += low <= 30000 && 30000 <= high ? 1 : 0;
     widest = test::larger(widest, high / low);
@@ -171,11 +173,11 @@ TEST(YoungFit, IsAsSureAsItSays) {
 
 TEST(YoungFit, NamesAnOutlier) {
   const test::Solid truth = bar(30000, 30000);
-  MeasuredCase c = measured(truth, 2000, 0.01);
+  fit::MeasuredCase c = measured(truth, 2000, 0.01);
   *c.measurements[4].displacement[2] += 0.5;
   const std::array<std::size_t, 1> first{0};
-  const YoungFit fit =
-      fit_young(truth.mesh, truth.materials, names, first, truth.fixed, std::span(&c, 1));
+  const fit::YoungFit fit =
+      fit::fit_young(truth.mesh, truth.materials, names, first, truth.fixed, std::span(&c, 1));
   ASSERT_EQ(fit.outliers.size(), 1u);
   EXPECT_EQ(fit.outliers[0], "point 4");
 }
@@ -184,13 +186,13 @@ TEST(YoungFit, NamesAnOutlier) {
 /// if its own residual is excluded (externally studentised).
 TEST(YoungFit, NamesAnOutlierAmongFew) {
   const test::Solid truth = bar(30000, 30000);
-  MeasuredCase c = measured(truth, 2000, 0.01);
-  for (Measurement& m : c.measurements) // 7 axes of 7 places
+  fit::MeasuredCase c = measured(truth, 2000, 0.01);
+  for (fit::Measurement& m : c.measurements) // 7 axes of 7 places
     m.displacement[0] = m.displacement[1] = std::nullopt;
   *c.measurements[2].displacement[2] += 0.3;
   const std::array<std::size_t, 1> first{0};
-  const YoungFit fit =
-      fit_young(truth.mesh, truth.materials, names, first, truth.fixed, std::span(&c, 1));
+  const fit::YoungFit fit =
+      fit::fit_young(truth.mesh, truth.materials, names, first, truth.fixed, std::span(&c, 1));
   EXPECT_EQ(fit.axes, 7u);
   EXPECT_EQ(fit.outliers, std::vector<std::string>{"point 2"});
 }
@@ -201,12 +203,12 @@ TEST(YoungFit, NamesAnOutlierThatTheFitFollows) {
   const test::Solid truth = bar(30000, 30000);
   const std::array<std::size_t, 1> first{0};
   for (const double error : {0.0, 0.028}) {
-    MeasuredCase c = measured(truth, 2000, 0.01);
-    for (Measurement& m : c.measurements)
+    fit::MeasuredCase c = measured(truth, 2000, 0.01);
+    for (fit::Measurement& m : c.measurements)
       m.displacement[0] = m.displacement[1] = std::nullopt;
     *c.measurements[4].displacement[2] += error;
-    const YoungFit fit =
-        fit_young(truth.mesh, truth.materials, names, first, truth.fixed, std::span(&c, 1));
+    const fit::YoungFit fit =
+        fit::fit_young(truth.mesh, truth.materials, names, first, truth.fixed, std::span(&c, 1));
     EXPECT_EQ(fit.outliers,
               error > 0 ? std::vector<std::string>{"point 4"} : std::vector<std::string>{});
   }
@@ -214,11 +216,11 @@ TEST(YoungFit, NamesAnOutlierThatTheFitFollows) {
 
 TEST(YoungFit, NamesBadData) {
   const test::Solid s = bar(30000, 30000);
-  const MeasuredCase good = measured(s, 2000, 0);
+  const fit::MeasuredCase good = measured(s, 2000, 0);
   EXPECT_EQ(refusal(s, good), "");
 
-  MeasuredCase c = good;
-  for (Measurement& m : c.measurements)
+  fit::MeasuredCase c = good;
+  for (fit::Measurement& m : c.measurements)
     for (auto& d : m.displacement)
       *d = -*d;
   EXPECT_NE(refusal(s, c).find("against the loads"), std::string::npos) << refusal(s, c);
@@ -271,7 +273,7 @@ TEST(SwingFit, FindsFrequencyAndDamping) {
           -4 + 2 * std::exp(-ratio * w * s) * std::cos(w * std::sqrt(1 - ratio * ratio) * s + 0.4) +
           normal(random));
     }
-    const SwingFit fit = fit_swing(t, y);
+    const fit::SwingFit fit = fit::fit_swing(t, y);
     EXPECT_NEAR(fit.frequency, 7 * std::sqrt(1 - ratio * ratio), 0.01 * 7) << ratio;
     EXPECT_NEAR(fit.ratio, ratio, 0.02 * ratio + 0.0005) << ratio;
     EXPECT_LT(fit.ratio_interval[0], ratio + 0.001);
@@ -298,7 +300,7 @@ TEST(SwingFit, IntervalsHoldTheTruthAsOftenAsTheySay) {
         y.push_back(-6.6 + 6.6 * std::exp(-decay * t.back()) * std::cos(w * t.back() + 0.2) +
                     normal(random));
       }
-      const SwingFit fit = fit_swing(t, y);
+      const fit::SwingFit fit = fit::fit_swing(t, y);
       const auto holds = [](const std::array<double, 2>& interval, double truth) {
         return interval[0] <= truth && truth <= interval[1] ? 1 : 0;
       };
@@ -331,7 +333,7 @@ TEST(SwingFit, RatioIntervalIncludesTheCovariance) {
     t.push_back(0.024 * k);
     y.push_back(swing(p, t.back()) + normal(random));
   }
-  const SwingFit fit = fit_swing(t, y);
+  const fit::SwingFit fit = fit::fit_swing(t, y);
   // Gauss and Newton from the truth, by differences: rest, cosine, sine, ratio, frequency.
   Eigen::Matrix<double, 40, 5> jacobian;
   Eigen::Matrix<double, 40, 1> left;
@@ -364,7 +366,7 @@ TEST(SwingFit, RefusesWhatIsNoSwing) {
       v.push_back(y(t.back()));
     }
     try {
-      fit_swing(t, v);
+      fit::fit_swing(t, v);
     } catch (const Error& error) {
       return std::string(error.what());
     }

@@ -18,40 +18,40 @@
 
 namespace gewebe::test {
 
-inline std::array<Vec3, 4> places_of(const TetMesh& mesh, std::size_t t) {
+inline std::array<Vec3, 4> places_of(const tetrahedra::TetMesh& mesh, std::size_t t) {
   const Tetrahedron& c = mesh.tetrahedra[t];
   return {mesh.points[c[0]], mesh.points[c[1]], mesh.points[c[2]], mesh.points[c[3]]};
 }
 
-inline double volume_at(const TetMesh& mesh, std::size_t t) {
+inline double volume_at(const tetrahedra::TetMesh& mesh, std::size_t t) {
   const auto [a, b, c, d] = places_of(mesh, t);
-  return tetrahedron_volume(a, b, c, d);
+  return tetrahedra::tetrahedron_volume(a, b, c, d);
 }
 
 /// How far its dihedral angles keep from 0 and 180 degrees.
-inline double least_margin(const TetMesh& mesh, std::size_t t) {
+inline double least_margin(const tetrahedra::TetMesh& mesh, std::size_t t) {
   const auto [a, b, c, d] = places_of(mesh, t);
   double least = 180;
-  for (const double angle : dihedral_angles(a, b, c, d)) {
+  for (const double angle : tetrahedra::dihedral_angles(a, b, c, d)) {
     const double degrees = angle * 180 / std::numbers::pi;
-    least = smaller(least, smaller(degrees, 180 - degrees));
+    least = numeric::smaller(least, numeric::smaller(degrees, 180 - degrees));
   }
   return least;
 }
 
-inline double area(const TetMesh& mesh, const Triangle& t) {
+inline double area(const tetrahedra::TetMesh& mesh, const Triangle& t) {
   return norm(cross(mesh.points[t[1]] - mesh.points[t[0]], mesh.points[t[2]] - mesh.points[t[0]])) /
          2;
 }
 
-inline double wall_area(const TetCut& cut) {
+inline double wall_area(const incision::TetCut& cut) {
   double sum = 0;
-  for (const WallTriangle& wall : cut.wall)
+  for (const incision::WallTriangle& wall : cut.wall)
     sum += area(cut.mesh, wall.corners[0]);
   return sum;
 }
 
-inline std::map<std::int32_t, long double> volumes(const TetMesh& mesh) {
+inline std::map<std::int32_t, long double> volumes(const tetrahedra::TetMesh& mesh) {
   std::map<std::int32_t, long double> sums;
   for (std::size_t t = 0; t < mesh.tetrahedra.size(); ++t)
     sums[mesh.material.empty() ? 0 : mesh.material[t]] += volume_at(mesh, t);
@@ -65,10 +65,10 @@ inline Triangle turned(Triangle face) {
 
 /// Faces of one tetrahedron, counter-clockwise from outside, each turned so that its least corner
 /// comes first.
-inline std::set<Triangle> outer_faces(const TetMesh& mesh) {
+inline std::set<Triangle> outer_faces(const tetrahedra::TetMesh& mesh) {
   std::vector<std::array<Triangle, 2>> all; // ascending, turned
   for (const Tetrahedron& t : mesh.tetrahedra)
-    for (const auto& face : tetrahedron_faces) {
+    for (const auto& face : tetrahedra::tetrahedron_faces) {
       const Triangle corners{t[face[0]], t[face[1]], t[face[2]]};
       all.push_back({corners, turned(corners)});
       std::ranges::sort(all.back()[0]);
@@ -87,25 +87,26 @@ inline std::array<double, 3> key_of(const Vec3& p) {
 }
 
 /// Does a place lie in a tetrahedron, to rounding?
-inline bool is_within(const TetMesh& mesh, std::size_t t, const Vec3& place) {
+inline bool is_within(const tetrahedra::TetMesh& mesh, std::size_t t, const Vec3& place) {
   const std::array<Vec3, 4> p = places_of(mesh, t);
-  const double whole = tetrahedron_volume(p[0], p[1], p[2], p[3]);
+  const double whole = tetrahedra::tetrahedron_volume(p[0], p[1], p[2], p[3]);
   for (std::size_t k = 0; k < 4; ++k) {
     std::array<Vec3, 4> q = p;
     q[k] = place;
-    if (!(tetrahedron_volume(q[0], q[1], q[2], q[3]) >= -1e-9 * whole))
+    if (!(tetrahedra::tetrahedron_volume(q[0], q[1], q[2], q[3]) >= -1e-9 * whole))
       return false;
   }
   return true;
 }
 
 /// Nodes in the middles of a triangle's edges 01, 12, 20.
-inline Triangle middles_of(const TetMesh& mesh, std::uint32_t t, const Triangle& corners) {
+inline Triangle middles_of(const tetrahedra::TetMesh& mesh, std::uint32_t t,
+                           const Triangle& corners) {
   Triangle middles{};
   for (std::size_t c = 0; c < 3; ++c)
     for (std::size_t k = 0; k < 6; ++k) {
-      const std::set<std::uint32_t> edge{mesh.tetrahedra[t][tetrahedron_edges[k][0]],
-                                         mesh.tetrahedra[t][tetrahedron_edges[k][1]]};
+      const std::set<std::uint32_t> edge{mesh.tetrahedra[t][tetrahedra::tetrahedron_edges[k][0]],
+                                         mesh.tetrahedra[t][tetrahedra::tetrahedron_edges[k][1]]};
       if (edge == std::set<std::uint32_t>{corners[c], corners[(c + 1) % 3]})
         middles[c] = mesh.middles[t][k];
     }
@@ -113,16 +114,17 @@ inline Triangle middles_of(const TetMesh& mesh, std::uint32_t t, const Triangle&
 }
 
 /// The first thing that is wrong, or "".
-inline std::string fault_of(const TetMesh& before, const TetCut& cut, double least_angle) {
-  const TetMesh& mesh = cut.mesh;
+inline std::string fault_of(const tetrahedra::TetMesh& before, const incision::TetCut& cut,
+                            double least_angle) {
+  const tetrahedra::TetMesh& mesh = cut.mesh;
   const auto at = [](const char* what, std::size_t n) { return what + (" " + std::to_string(n)); };
-  check_mesh(mesh);
-  const double size = norm(bounding_box(before).size());
+  tetrahedra::check_mesh(mesh);
+  const double size = norm(tetrahedra::bounding_box(before).size());
   if (cut.origin.size() != mesh.points.size() || cut.tetrahedron.size() != mesh.tetrahedra.size())
     return "sizes of origins";
   // Nodes stand where their origin says, tetrahedra have their parent's material, and shape.
   for (std::size_t n = 0; n < mesh.points.size(); ++n) {
-    const TetNodeOrigin& from = cut.origin[n];
+    const incision::TetNodeOrigin& from = cut.origin[n];
     const bool node = from.node < before.points.size();
     if (node == (from.tetrahedron < before.tetrahedra.size()))
       return at("origin of node", n);
@@ -137,14 +139,14 @@ inline std::string fault_of(const TetMesh& before, const TetCut& cut, double lea
     if (!node && !(std::fabs(sum - 1) <= 1e-12))
       return at("weights of node", n);
   }
-  const std::vector<Vec3> carried = carry_over(before, cut.origin, before.points);
+  const std::vector<Vec3> carried = incision::carry_over(before, cut.origin, before.points);
   for (std::size_t n = 0; n < mesh.points.size(); ++n)
     if (!(norm(mesh.points[n] - carried[n]) <= 1e-12 * (norm(carried[n]) + size)))
       return at("place of node", n);
   std::set<std::array<double, 3>> moved;
   for (const std::uint32_t t : cut.changed)
     for (const std::uint32_t corner : before.tetrahedra[t])
-      if (cut.origin[corner].node == TetNodeOrigin::none)
+      if (cut.origin[corner].node == incision::TetNodeOrigin::none)
         moved.insert(key_of(mesh.points[corner]));
   std::vector<bool> changed(before.tetrahedra.size());
   for (const std::uint32_t t : cut.changed)
@@ -169,7 +171,7 @@ inline std::string fault_of(const TetMesh& before, const TetCut& cut, double lea
     const Tetrahedron& own = before.tetrahedra[parent];
     for (std::size_t k = 0; k < 4; ++k) {
       const std::uint32_t corner = mesh.tetrahedra[t][k];
-      if (cut.origin[corner].node != TetNodeOrigin::none
+      if (cut.origin[corner].node != incision::TetNodeOrigin::none
               ? std::ranges::find(own, cut.origin[corner].node) == own.end()
               : !moved.contains(key_of(mesh.points[corner])) &&
                     !is_within(before, parent, mesh.points[corner]))
@@ -182,7 +184,8 @@ inline std::string fault_of(const TetMesh& before, const TetCut& cut, double lea
     if (!(std::fabs(static_cast<double>(new_volumes[material] - volume)) <=
           1e-12 * static_cast<double>(volume)))
       return at("volume of material", static_cast<std::size_t>(material));
-  const TetReport was = examine_tetrahedra(before), is = examine_tetrahedra(mesh);
+  const tetrahedra::TetReport was = tetrahedra::examine_tetrahedra(before),
+                              is = tetrahedra::examine_tetrahedra(mesh);
   if (!is.sound())
     return "faces that are crowded or overlap";
   if (was.manifold_boundary() && !is.manifold_boundary())
@@ -196,7 +199,7 @@ inline std::string fault_of(const TetMesh& before, const TetCut& cut, double lea
   const std::set<Triangle> outer = outer_faces(mesh);
   std::set<Triangle> walls;
   for (std::size_t w = 0; w < cut.wall.size(); ++w) {
-    const WallTriangle& wall = cut.wall[w];
+    const incision::WallTriangle& wall = cut.wall[w];
     for (std::size_t side = 0; side < 2; ++side) {
       if (!outer.contains(turned(wall.corners[side])))
         return at("wall inside the tissue", w);
@@ -222,12 +225,12 @@ inline std::string fault_of(const TetMesh& before, const TetCut& cut, double lea
   // The surface: what is told, and the faces that it does not replace, are all that is beside
   // walls.
   std::set<Triangle> replaced, rest;
-  for (const CutFace& face : cut.surface) {
+  for (const incision::CutFace& face : cut.surface) {
     const auto n = static_cast<std::size_t>(&face - cut.surface.data());
     if (face.face_before / 4 != cut.tetrahedron[face.tetrahedron])
       return at("tetrahedron of surface", n);
     const Tetrahedron& t = before.tetrahedra[face.face_before / 4];
-    const auto& old = tetrahedron_faces[face.face_before % 4];
+    const auto& old = tetrahedra::tetrahedron_faces[face.face_before % 4];
     replaced.insert(turned({t[old[0]], t[old[1]], t[old[2]]}));
     if (!rest.insert(turned(face.corners)).second)
       return at("surface told twice", n);

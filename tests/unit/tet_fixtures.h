@@ -16,9 +16,9 @@ namespace gewebe::test {
 
 /// A box of nx × ny × nz cubes of side `cell`, each cut into six tetrahedra about its diagonal (of
 /// Kuhn): volume cell³ / 6 each, dihedral angles 45, 60, 90 degrees.
-inline TetMesh box_tetrahedra(std::uint32_t nx, std::uint32_t ny, std::uint32_t nz,
-                              double cell = 1) {
-  TetMesh mesh;
+inline tetrahedra::TetMesh box_tetrahedra(std::uint32_t nx, std::uint32_t ny, std::uint32_t nz,
+                                          double cell = 1) {
+  tetrahedra::TetMesh mesh;
   for (std::uint32_t k = 0; k <= nz; ++k)
     for (std::uint32_t j = 0; j <= ny; ++j)
       for (std::uint32_t i = 0; i <= nx; ++i)
@@ -42,8 +42,8 @@ inline TetMesh box_tetrahedra(std::uint32_t nx, std::uint32_t ny, std::uint32_t 
 }
 
 /// A box 2 × 2 × 2 whose inner nodes stand anywhere.
-inline TetMesh distorted_box() {
-  TetMesh mesh = box_tetrahedra(3, 3, 3, 2.0 / 3);
+inline tetrahedra::TetMesh distorted_box() {
+  tetrahedra::TetMesh mesh = box_tetrahedra(3, 3, 3, 2.0 / 3);
   for (Vec3& p : mesh.points)
     for (int axis = 0; axis < 3; ++axis)
       if (std::abs(p[axis] - 2) < 1e-9)
@@ -58,14 +58,14 @@ inline TetMesh distorted_box() {
 }
 
 /// The same with coordinates that fill a double, some odd materials if asked for, and quadratic.
-inline TetMesh odd_tetrahedra(bool quadratic, bool material) {
-  TetMesh mesh = box_tetrahedra(2, 1, 3);
+inline tetrahedra::TetMesh odd_tetrahedra(bool quadratic, bool material) {
+  tetrahedra::TetMesh mesh = box_tetrahedra(2, 1, 3);
   for (Vec3& p : mesh.points)
     p = {p.x / 3 + 1e-17, p.y * 1.1 - p.x * 0.1, -p.z * 0.7 + p.x * 1e-9 + 100};
   for (Tetrahedron& t : mesh.tetrahedra) // z was mirrored
     std::swap(t[2], t[3]);
   if (quadratic)
-    make_quadratic(mesh);
+    tetrahedra::make_quadratic(mesh);
   if (material)
     for (std::size_t t = 0; t < mesh.tetrahedra.size(); ++t)
       mesh.material.push_back(t % 5 == 0 ? 1000000 : static_cast<std::int32_t>(t % 3));
@@ -78,7 +78,7 @@ bool same_bytes(const std::vector<T>& a, const std::vector<T>& b) {
          (a.empty() || std::memcmp(a.data(), b.data(), a.size() * sizeof(T)) == 0);
 }
 
-inline bool same_bytes(const TetMesh& a, const TetMesh& b) {
+inline bool same_bytes(const tetrahedra::TetMesh& a, const tetrahedra::TetMesh& b) {
   return same_bytes(a.points, b.points) && same_bytes(a.tetrahedra, b.tetrahedra) &&
          same_bytes(a.middles, b.middles) && same_bytes(a.material, b.material);
 }

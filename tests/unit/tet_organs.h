@@ -10,21 +10,22 @@
 namespace gewebe::test {
 
 /// What is in a closed surface, its longest side so many cells.
-inline TetMesh surface_tetrahedra(const TriangleMesh& surface, double cells) {
+inline tetrahedra::TetMesh surface_tetrahedra(const TriangleMesh& surface, double cells) {
   const double cell = bounding_box(surface).longest_side() / cells;
-  VoxelizeOptions exact;
+  voxelization::VoxelizeOptions exact;
   exact.samples = 3;
-  exact.rule = VoxelRule::winding;
-  const Grid grid = voxelize({}, surface, uniform_transform(cell / 2), exact);
-  StuffingOptions options;
+  exact.rule = voxelization::VoxelRule::winding;
+  const volume::Grid grid =
+      voxelization::voxelize({}, surface, volume::uniform_transform(cell / 2), exact);
+  stuffing::StuffingOptions options;
   options.cell = cell;
-  return stuff({}, grid, options);
+  return stuffing::stuff({}, grid, options);
 }
 
 /// As that; empty where there is no such file.
-inline TetMesh organ_tetrahedra(const std::string& file, double cells) {
+inline tetrahedra::TetMesh organ_tetrahedra(const std::string& file, double cells) {
   const TriangleMesh surface = load_test_mesh(file);
-  return surface.triangles.empty() ? TetMesh{} : surface_tetrahedra(surface, cells);
+  return surface.triangles.empty() ? tetrahedra::TetMesh{} : surface_tetrahedra(surface, cells);
 }
 
 } // namespace gewebe::test

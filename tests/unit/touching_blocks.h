@@ -21,33 +21,33 @@ namespace gewebe::test {
 inline constexpr double block_edge = 4; ///< mm, of the elements
 
 /// A block of so many elements, its lowest corner there.
-inline Model block(std::uint32_t nx, std::uint32_t ny, std::uint32_t nz, const Vec3& corner,
-                   bool held = false) {
-  SolidModelOptions options;
+inline model::Model block(std::uint32_t nx, std::uint32_t ny, std::uint32_t nz, const Vec3& corner,
+                          bool held = false) {
+  fem::SolidModelOptions options;
   options.material.materials = {{"gel", 1e-3, 2e4, 1, 0.2, 0.4}};
   options.quadratic = false;
-  Model model = solid_model(box_tetrahedra(nx, ny, nz, block_edge), options, {});
-  for (Node& node : model.nodes) {
+  model::Model model = fem::solid_model(box_tetrahedra(nx, ny, nz, block_edge), options, {});
+  for (model::Node& node : model.nodes) {
     if (held && node.position.z == 0)
-      node.fixed = fixed_all;
+      node.fixed = model::fixed_all;
     node.position += corner;
   }
   return model;
 }
 
-inline void add(Simulation& s, const std::string& name, const Model& model) {
-  s.add_object(name, model, Method::ela, {}, Integration::implicit);
+inline void add(scene::Simulation& s, const std::string& name, const model::Model& model) {
+  s.add_object(name, model, scene::Method::ela, {}, scene::Integration::implicit);
 }
 
-inline Vec3 sum_of_forces(const Simulation& s, std::size_t object) {
+inline Vec3 sum_of_forces(const scene::Simulation& s, std::size_t object) {
   Vec3 sum;
-  for (const NodeVector& f : s.contact_forces(object))
+  for (const contact::NodeVector& f : s.contact_forces(object))
     sum += f.value;
   return sum;
 }
 
 /// Median length of the edges of two objects' surfaces.
-inline double median_edge(const Simulation& s, std::size_t a, std::size_t b) {
+inline double median_edge(const scene::Simulation& s, std::size_t a, std::size_t b) {
   std::vector<double> lengths;
   for (const std::size_t o : {a, b})
     for (const Triangle& t : s.model(o).triangles)
@@ -60,14 +60,14 @@ inline double median_edge(const Simulation& s, std::size_t a, std::size_t b) {
 
 /// Distance of two objects' surfaces, or of one from itself, over the length of an edge; below 0
 /// where they pass each other.
-inline double least_gap(const Simulation& s, std::size_t a, std::size_t b) {
+inline double least_gap(const scene::Simulation& s, std::size_t a, std::size_t b) {
   collision::CollisionSurface all;
   std::vector<Vec3> places;
   std::vector<std::size_t> objects{a};
   if (a != b)
     objects.push_back(b);
   for (const std::size_t o : objects) {
-    const Model& model = s.model(o);
+    const model::Model& model = s.model(o);
     const std::vector<double> u = shape(s, o);
     contact::BodySurface surface;
     std::vector<Vec3> x;
@@ -88,14 +88,14 @@ inline double least_gap(const Simulation& s, std::size_t a, std::size_t b) {
 /// Surfaces at rest on each other stand apart by less than this, over the length of an edge.
 inline constexpr double gap_allowed = 1.001e-3;
 
-inline double weight_of(const Simulation& s, std::size_t object) {
+inline double weight_of(const scene::Simulation& s, std::size_t object) {
   double mass = 0;
-  for (const Node& n : s.model(object).nodes)
+  for (const model::Node& n : s.model(object).nodes)
     mass += n.mass;
   return 9810 * mass;
 }
 
-inline std::vector<std::uint32_t> nodes_of(const Model& model) {
+inline std::vector<std::uint32_t> nodes_of(const model::Model& model) {
   std::vector<std::uint32_t> all;
   for (std::uint32_t i = 0; i < model.nodes.size(); ++i)
     all.push_back(i);

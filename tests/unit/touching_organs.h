@@ -25,28 +25,28 @@
 
 namespace gewebe::test {
 
-inline const std::vector<Material>& soft_tissue() {
-  static const std::vector<Material> all{{"tissue", 1e-3, 2e4, 1, 0.2, 0.4}};
+inline const std::vector<model::Material>& soft_tissue() {
+  static const std::vector<model::Material> all{{"tissue", 1e-3, 2e4, 1, 0.2, 0.4}};
   return all;
 }
 
 constexpr double tissue_drag = 40; ///< 1/s: it comes to rest soon
 
-inline Model solid_of(const TetMesh& mesh) {
-  SolidModelOptions options;
+inline model::Model solid_of(const tetrahedra::TetMesh& mesh) {
+  fem::SolidModelOptions options;
   options.material.materials = soft_tissue();
   options.quadratic = false;
   options.drag_rate = tissue_drag;
-  return solid_model(mesh, options, {});
+  return fem::solid_model(mesh, options, {});
 }
 
-inline Model net_of(const TriangleMesh& mesh) {
-  BuildOptions options;
+inline model::Model net_of(const TriangleMesh& mesh) {
+  model::BuildOptions options;
   options.material.materials = soft_tissue();
   options.drag_rate = tissue_drag;
   options.bend = true;
   options.centrals_free = true;
-  return build_model(mesh, options, Context{}).model;
+  return model::build_model(mesh, options, Context{}).model;
 }
 
 /// So that its box is so long, and stands on this place by the middle of its lower side.
@@ -63,11 +63,12 @@ inline TriangleMesh placed(TriangleMesh mesh, double size, const Vec3& on) {
 }
 
 /// The part of its nodes below (or above), of its height.
-inline std::vector<std::uint32_t> ends_of(const Model& model, bool below, double part = 0.2) {
+inline std::vector<std::uint32_t> ends_of(const model::Model& model, bool below,
+                                          double part = 0.2) {
   double low = HUGE_VAL, high = -HUGE_VAL;
-  for (const Node& n : model.nodes) {
-    low = smaller(low, n.position.z);
-    high = larger(high, n.position.z);
+  for (const model::Node& n : model.nodes) {
+    low = numeric::smaller(low, n.position.z);
+    high = numeric::larger(high, n.position.z);
   }
   std::vector<std::uint32_t> all;
   for (std::uint32_t i = 0; i < model.nodes.size(); ++i) {
@@ -131,13 +132,13 @@ inline std::vector<Vec3> hairpin(double leg, double apart, double step) {
   return all;
 }
 
-inline TetMesh stuffed(const TriangleMesh& surface, double cells) {
-  return surface.triangles.empty() ? TetMesh{} : surface_tetrahedra(surface, cells);
+inline tetrahedra::TetMesh stuffed(const TriangleMesh& surface, double cells) {
+  return surface.triangles.empty() ? tetrahedra::TetMesh{} : surface_tetrahedra(surface, cells);
 }
 
 /// Of an object as a scene has it.
-inline TriangleMesh surface_of(const Simulation& s, std::size_t object, bool moved = true) {
-  TriangleMesh mesh = surface_mesh(s.model(object));
+inline TriangleMesh surface_of(const scene::Simulation& s, std::size_t object, bool moved = true) {
+  TriangleMesh mesh = model::surface_mesh(s.model(object));
   if (!moved)
     return mesh;
   const std::span<const double> u = s.displacement(object);
@@ -153,9 +154,9 @@ struct Pushed {
   std::size_t nodes = 0;
 };
 
-inline Pushed pushed(const Simulation& s, std::size_t object) {
+inline Pushed pushed(const scene::Simulation& s, std::size_t object) {
   Pushed all;
-  for (const NodeVector& f : s.contact_forces(object)) {
+  for (const contact::NodeVector& f : s.contact_forces(object)) {
     all.sum += f.value;
     all.size += norm(f.value);
     ++all.nodes;
@@ -177,7 +178,7 @@ constexpr double rest_speed = 0.02; ///< mm/s: a fifth of the slip speed up to w
 
 /// Steps until nothing moves faster than rest_speed. \param look of each step
 template <class Look>
-bool come_to_rest(Simulation& s, double edge, double longest, Look&& look) {
+bool come_to_rest(scene::Simulation& s, double edge, double longest, Look&& look) {
   const double before = s.time();
   std::vector<std::vector<double>> was(s.object_count());
   while (s.time() - before < longest) {
@@ -187,7 +188,7 @@ bool come_to_rest(Simulation& s, double edge, double longest, Look&& look) {
     for (std::size_t k = 0; k < s.object_count(); ++k) {
       std::vector<double> now = shape(s, k);
       for (std::size_t a = 0; a < now.size(); ++a)
-        most = larger(most, was[k].empty() ? edge : std::abs(now[a] - was[k][a]));
+        most = numeric::larger(most, was[k].empty() ? edge : std::abs(now[a] - was[k][a]));
       was[k] = std::move(now);
     }
     if (most <= rest_speed * press_step)
@@ -197,15 +198,15 @@ bool come_to_rest(Simulation& s, double edge, double longest, Look&& look) {
 }
 
 /// How far the upper one may go down, by a geometry of its own, until it meets the lower one.
-inline double clearance(const Model& below, const Model& above) {
-  const TriangleMesh low = surface_mesh(below), high = surface_mesh(above);
+inline double clearance(const model::Model& below, const model::Model& above) {
+  const TriangleMesh low = model::surface_mesh(below), high = model::surface_mesh(above);
   const auto meets = [&](double down) {
     TriangleMesh moved = high;
     for (Vec3& p : moved.points)
       p.z -= down;
     Overlap both = depth_inside(moved, low, 1);
     both.add(depth_inside(low, moved, 1));
-    return larger(both.nodes, both.edges) > 0;
+    return numeric::larger(both.nodes, both.edges) > 0;
   };
   double apart = 0, together = 1;
   while (!meets(together) && together < 1e3)
@@ -228,34 +229,34 @@ struct Press {
 };
 
 /// Presses the upper end of an object straight down.
-inline void press_down(Simulation& s, std::size_t object, const std::vector<std::uint32_t>& led,
-                       double force) {
-  s.apply(SetForce{object, led, {0, 0, -force / static_cast<double>(led.size())}});
+inline void press_down(scene::Simulation& s, std::size_t object,
+                       const std::vector<std::uint32_t>& led, double force) {
+  s.apply(scene::SetForce{object, led, {0, 0, -force / static_cast<double>(led.size())}});
 }
 
 /// Presses the upper one, by its upper end, onto the lower one, which is held below.
-inline Rest pressed_together(Model below, Model above, const Press& press) {
+inline Rest pressed_together(model::Model below, model::Model above, const Press& press) {
   const double down = clearance(below, above) - 0.1;
-  for (Node& n : above.nodes)
+  for (model::Node& n : above.nodes)
     n.position.z -= down;
   for (const std::uint32_t i : ends_of(below, true))
-    below.nodes[i].fixed = fixed_all;
+    below.nodes[i].fixed = model::fixed_all;
   const std::vector<std::uint32_t> led = ends_of(above, false);
   for (const std::uint32_t i : led)
-    above.nodes[i].fixed = fixed_x | fixed_y;
-  Simulation s(one_thread(), {});
+    above.nodes[i].fixed = model::fixed_x | model::fixed_y;
+  scene::Simulation s(one_thread(), {});
   if (press.still) {
-    s.add_object("below", below, Method::ffe);
-    s.apply(SetTimestep{press_step});
+    s.add_object("below", below, scene::Method::ffe);
+    s.apply(scene::SetTimestep{press_step});
   } else {
     add(s, "below", below);
   }
   add(s, "above", above);
   if (press.meet)
-    s.apply(SetContact{1, 0, press.friction});
+    s.apply(scene::SetContact{1, 0, press.friction});
   press_down(s, 1, led, press.force);
   const double edge =
-      smaller(mean_edge(surface_of(s, 0, false)), mean_edge(surface_of(s, 1, false)));
+      numeric::smaller(mean_edge(surface_of(s, 0, false)), mean_edge(surface_of(s, 1, false)));
   Rest rest;
   const auto overlap_now = [&] {
     const TriangleMesh a = surface_of(s, 0), b = surface_of(s, 1);
@@ -269,8 +270,8 @@ inline Rest pressed_together(Model below, Model above, const Press& press) {
     rest.size = one.size;
     rest.touched = one.nodes;
     if (one.size > 0 || other.size > 0) {
-      const double off = norm(one.sum + other.sum) / smaller(one.size, other.size);
-      rest.off = press.still ? off : larger(rest.off, off);
+      const double off = norm(one.sum + other.sum) / numeric::smaller(one.size, other.size);
+      rest.off = press.still ? off : numeric::larger(rest.off, off);
     }
   });
   rest.inside = overlap_now();
@@ -278,16 +279,16 @@ inline Rest pressed_together(Model below, Model above, const Press& press) {
 }
 
 /// Presses an object that is held at its lower end, by its upper one, until it touches itself.
-inline Rest folded(Model model, const std::vector<std::uint32_t>& held,
+inline Rest folded(model::Model model, const std::vector<std::uint32_t>& held,
                    const std::vector<std::uint32_t>& led, const Press& press) {
   for (const std::uint32_t i : led)
-    model.nodes[i].fixed = fixed_x | fixed_y;
+    model.nodes[i].fixed = model::fixed_x | model::fixed_y;
   for (const std::uint32_t i : held)
-    model.nodes[i].fixed = fixed_all;
-  Simulation s(one_thread(), {});
+    model.nodes[i].fixed = model::fixed_all;
+  scene::Simulation s(one_thread(), {});
   add(s, "tube", model);
   if (press.meet)
-    s.apply(SetContact{0, 0, press.friction});
+    s.apply(scene::SetContact{0, 0, press.friction});
   press_down(s, 0, led, press.force);
   const double edge = mean_edge(surface_of(s, 0, false));
   Rest rest;
@@ -296,7 +297,7 @@ inline Rest folded(Model model, const std::vector<std::uint32_t>& held,
     rest.size = all.size;
     rest.touched = all.nodes;
     if (all.size > 0)
-      rest.off = larger(rest.off, norm(all.sum) / all.size);
+      rest.off = numeric::larger(rest.off, norm(all.sum) / all.size);
   });
   rest.inside.edges = depth_in_itself(surface_of(s, 0), edge);
   return rest;

@@ -20,23 +20,23 @@ inline constexpr double viscous_young = 1e4, viscous_edge = 10; // Pa, mm
 
 /// At x = 0, y = 0 and z = 0 it slides.
 struct ViscousModel {
-  Model model;
-  TetMesh mesh;
+  model::Model model;
+  tetrahedra::TetMesh mesh;
 
-  ViscousModel(std::span<const PronyTerm> terms, const HyperelasticLaw& law, double poisson,
-               bool quadratic = true) {
-    SolidModelOptions options;
-    Material gel{"gel", 1e-3, viscous_young, 1, 0.2, poisson};
+  ViscousModel(std::span<const model::PronyTerm> terms, const model::HyperelasticLaw& law,
+               double poisson, bool quadratic = true) {
+    fem::SolidModelOptions options;
+    model::Material gel{"gel", 1e-3, viscous_young, 1, 0.2, poisson};
     gel.law = law;
     gel.prony.assign(terms.begin(), terms.end());
     options.material.materials = {gel};
     options.quadratic = quadratic;
-    model = solid_model(box_tetrahedra(2, 2, 2, viscous_edge / 2), options, {});
-    for (Node& node : model.nodes)
+    model = fem::solid_model(box_tetrahedra(2, 2, 2, viscous_edge / 2), options, {});
+    for (model::Node& node : model.nodes)
       for (int axis = 0; axis < 3; ++axis)
         if (node.position[axis] == 0)
           node.fixed = static_cast<std::uint8_t>(node.fixed | (1 << axis));
-    mesh = element_mesh(model);
+    mesh = fem::element_mesh(model);
   }
 
   std::vector<std::uint8_t> rollers() const {
@@ -48,7 +48,7 @@ struct ViscousModel {
   }
   /// Of a stress along x at the end, Pa.
   std::vector<double> forces(double stress) const {
-    const TetBoundary of = boundary(mesh);
+    const tetrahedra::TetBoundary of = tetrahedra::boundary(mesh);
     std::vector<std::uint32_t> end;
     for (std::uint32_t t = 0; t < of.mesh.triangles.size(); ++t) {
       bool at_end = true;
@@ -57,10 +57,10 @@ struct ViscousModel {
       if (at_end)
         end.push_back(t);
     }
-    return traction_load(mesh, of, end, {stress, 0, 0});
+    return fem::traction_load(mesh, of, end, {stress, 0, 0});
   }
-  Load pulled(double stress) const {
-    Load load;
+  contact::Load pulled(double stress) const {
+    contact::Load load;
     const std::vector<double> all = forces(stress);
     for (std::uint32_t i = 0; i < mesh.points.size(); ++i)
       if (const Vec3 f = vector_at(all, i); f != Vec3{})
@@ -82,16 +82,17 @@ struct ViscousModel {
 /// The same of linear elements, as a body that moves.
 struct ViscousBlock {
   ViscousModel of;
-  SolidMotion motion;
+  integrator::SolidMotion motion;
 
-  ViscousBlock(std::vector<PronyTerm> terms, const HyperelasticLaw& law, double poisson,
-               double density = 1e-3)
+  ViscousBlock(std::vector<model::PronyTerm> terms, const model::HyperelasticLaw& law,
+               double poisson, double density = 1e-3)
       : of(terms, law, poisson, false),
-        motion(of.mesh, std::vector<SolidMaterial>{{viscous_young, poisson, density, law, terms}},
+        motion(of.mesh,
+               std::vector<fem::SolidMaterial>{{viscous_young, poisson, density, law, terms}},
                options()) {}
-  static SolidMotionOptions options() {
-    SolidMotionOptions options;
-    options.law = SolidLaw::hyperelastic;
+  static integrator::SolidMotionOptions options() {
+    integrator::SolidMotionOptions options;
+    options.law = integrator::SolidLaw::hyperelastic;
     options.tolerance = 1e-5;
     options.max_rounds = 200;
     return options;

@@ -35,12 +35,12 @@ Check skipped(const std::string& what, const std::string& source, const std::str
 Answer solve(const test::SolidCase& c) {
   const Context one = timing::with_threads(1);
   Answer answer;
-  StiffnessMatrix k;
-  std::optional<Factor> factor;
+  linalg::StiffnessMatrix k;
+  std::optional<linalg::Factor> factor;
   answer.cost.unknowns = c.solid.unknowns();
   answer.cost.assembly = timing::processor_milliseconds([&] {
-    const auto elements = solid_elements(c.solid.mesh, c.solid.materials, one);
-    k = solid_stiffness(c.solid.mesh, elements, c.solid.fixed, one);
+    const auto elements = fem::solid_elements(c.solid.mesh, c.solid.materials, one);
+    k = fem::solid_stiffness(c.solid.mesh, elements, c.solid.fixed, one);
   });
   answer.cost.factor = timing::processor_milliseconds([&] { factor.emplace(k, one); });
   answer.cost.factor_mb = 8e-6 * static_cast<double>(factor->entries());

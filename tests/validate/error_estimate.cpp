@@ -24,7 +24,7 @@ constexpr double wanted_share = 0.9; ///< of cases whose estimate is within a fa
 
 /// A mesh and the places that its nodes had in a box, by which regions are found.
 struct Body {
-  TetMesh mesh;
+  tetrahedra::TetMesh mesh;
   std::vector<Vec3> box;
 };
 
@@ -133,8 +133,8 @@ Energy solve(const Recipe& r, const Body& body, bool quadratic) {
   for (std::size_t t = 0; quadratic && t < solid.mesh.tetrahedra.size(); ++t)
     for (std::size_t k = 0; k < 6; ++k)
       box[solid.mesh.middles[t][k]] =
-          0.5 * (box[solid.mesh.tetrahedra[t][tetrahedron_edges[k][0]]] +
-                 box[solid.mesh.tetrahedra[t][tetrahedron_edges[k][1]]]);
+          0.5 * (box[solid.mesh.tetrahedra[t][tetrahedra::tetrahedron_edges[k][0]]] +
+                 box[solid.mesh.tetrahedra[t][tetrahedra::tetrahedron_edges[k][1]]]);
   const auto pressed = [&](const Vec3& q) { // whole triangles of the coarsest mesh
     return q.z > 1 - 1e-9 && q.y < 0.5 + 1e-9 && q.x > 1 - 1.0 / r.cells[0] - 1e-9;
   };
@@ -150,25 +150,25 @@ Energy solve(const Recipe& r, const Body& body, bool quadratic) {
         c.given[3 * i + a] = r.kind == Kind::punch ? -0.5 : r.direction[static_cast<int>(a)];
     }
   if (r.kind == Kind::weight)
-    c.load = gravity_load(solid.mesh, solid.materials, solid.elements, 9810 * r.direction);
+    c.load = fem::gravity_load(solid.mesh, solid.materials, solid.elements, 9810 * r.direction);
   if (r.kind == Kind::traction) {
-    const TetBoundary faces = boundary(solid.mesh);
+    const tetrahedra::TetBoundary faces = tetrahedra::boundary(solid.mesh);
     std::vector<std::uint32_t> end;
     for (std::uint32_t k = 0; k < faces.mesh.triangles.size(); ++k)
       if (std::ranges::all_of(faces.mesh.triangles[k], [&](std::uint32_t corner) {
             return box[faces.node[corner]].x > 1 - 1e-9;
           }))
         end.push_back(k);
-    c.load = traction_load(solid.mesh, faces, end, 100 * r.direction);
+    c.load = fem::traction_load(solid.mesh, faces, end, 100 * r.direction);
   }
   const std::vector<double> u = displacements(c);
   std::vector<double> held(u.size());
-  multiply_solid(solid.mesh, solid.elements, u, held);
+  fem::multiply_solid(solid.mesh, solid.elements, u, held);
   const Vec3 gravity = r.kind == Kind::weight ? 9810 * r.direction : Vec3{};
-  const StressError error =
-      stress_error(solid.mesh, solid.elements,
-                   solid_stresses(solid.elements, solid_strains(solid.mesh, solid.materials,
-                                                                solid.elements, u, gravity)));
+  const fem::StressError error = fem::stress_error(
+      solid.mesh, solid.elements,
+      fem::solid_stresses(solid.elements, fem::solid_strains(solid.mesh, solid.materials,
+                                                             solid.elements, u, gravity)));
   return {std::inner_product(u.begin(), u.end(), held.begin(), 0.0),
           std::accumulate(error.energy.begin(), error.energy.end(), 0.0)};
 }

@@ -31,15 +31,15 @@ struct Held {
 
 /// 50 g on 300 N/m and 1 N s/m (of an arm that holds lightly), led 1.5 mm deep into a net of a
 /// thousand times an organ's stiffness, at rest (ffe), by implicit steps of the sample.
-Held hold(const std::optional<Coupling>& coupling) {
-  Simulation s(timing::with_threads(1), {});
-  Model model = test::organ(2);
-  for (Spring& spring : model.springs)
+Held hold(const std::optional<contact::Coupling>& coupling) {
+  scene::Simulation s(timing::with_threads(1), {});
+  model::Model model = test::organ(2);
+  for (model::Spring& spring : model.springs)
     spring.stiffness *= 1000;
-  s.add_object("o", std::move(model), Method::ffe);
-  s.apply(SetInstrument{0, {radius, {}, 0}, {above(0.1), {}}, "probe"});
+  s.add_object("o", std::move(model), scene::Method::ffe);
+  s.apply(scene::SetInstrument{0, {radius, {}, 0}, {above(0.1), {}}, "probe"});
   if (coupling)
-    s.apply(SetCoupling{0, *coupling});
+    s.apply(scene::SetCoupling{0, *coupling});
   const double mass = 50, spring = 3e5, damper = 1000, rest = -1.5;
   Held held;
   double z = 0.1, v = 0, felt = 0, late = 0, low = HUGE_VAL, high = -HUGE_VAL;
@@ -49,7 +49,7 @@ Held hold(const std::optional<Coupling>& coupling) {
     v = (mass * v + sample * (spring * (rest - z) + late)) /
         (mass + sample * damper + sample * sample * spring);
     z += sample * v;
-    s.apply(MoveInstrument{0, above(z), {}, 0});
+    s.apply(scene::MoveInstrument{0, above(z), {}, 0});
     s.step(sample);
     held.given -= late * sample * v;
     held.most = test::larger(held.most, held.given);
@@ -85,7 +85,7 @@ Section hand() {
             "s",
             "mm from peak to peak in a hundredth of a second (1e-9 at least)",
             {}};
-  const Held led = hold(Coupling{5e5, 500}), rigid = hold(std::nullopt);
+  const Held led = hold(contact::Coupling{5e5, 500}), rigid = hold(std::nullopt);
   const double last = led.excursion.back().y, without = rigid.excursion.back().y;
   section.checks.push_back({"coupled: excursion in the last hundredth of a second", "", "0 mm",
                             text_of(last, 2), last, 1e-3, text_of(last, 2)});

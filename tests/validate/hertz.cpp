@@ -34,7 +34,7 @@ double radius_of_theory(double depth) {
 
 /// A quarter of a block: cells of even width to beyond the touched circle, then wider and wider,
 /// until the block is 300 times as large as that. Held by its symmetry, and on its far sides.
-Model quarter_of_block(std::uint32_t across, bool quadratic, double poisson) {
+model::Model quarter_of_block(std::uint32_t across, bool quadratic, double poisson) {
   const double contact = radius_of_theory(deep), cell = contact / across;
   std::vector<double> at{0};
   while (at.back() < 1.2 * contact)
@@ -43,21 +43,22 @@ Model quarter_of_block(std::uint32_t across, bool quadratic, double poisson) {
   for (double width = cell * ratio; at.back() < 300 * contact; width *= ratio)
     at.push_back(at.back() + width);
   const auto n = static_cast<std::uint32_t>(at.size() - 1);
-  TetMesh mesh = test::box_tetrahedra(n, n, n);
+  tetrahedra::TetMesh mesh = test::box_tetrahedra(n, n, n);
   for (Vec3& p : mesh.points)
     p = {at[static_cast<std::size_t>(p.x)], at[static_cast<std::size_t>(p.y)],
          -at[static_cast<std::size_t>(n - p.z)]};
-  SolidModelOptions options;
+  fem::SolidModelOptions options;
   options.material.materials[0].young = young;
   options.material.materials[0].poisson = poisson;
   options.quadratic = quadratic;
-  Model model = solid_model(std::move(mesh), options, timing::with_threads(2));
-  for (Node& node : model.nodes) {
+  model::Model model = fem::solid_model(std::move(mesh), options, timing::with_threads(2));
+  for (model::Node& node : model.nodes) {
     const auto& [x, y, z] = node.position;
     if (x == at.back() || y == at.back() || z == -at.back())
-      node.fixed = fixed_all;
+      node.fixed = model::fixed_all;
     else
-      node.fixed = static_cast<std::uint8_t>((x == 0 ? fixed_x : 0) | (y == 0 ? fixed_y : 0));
+      node.fixed =
+          static_cast<std::uint8_t>((x == 0 ? model::fixed_x : 0) | (y == 0 ? model::fixed_y : 0));
   }
   return model;
 }
@@ -74,7 +75,7 @@ public:
   Block(std::uint32_t across, bool quadratic, double poisson)
       : model_(quarter_of_block(across, quadratic, poisson)),
         cell_(radius_of_theory(deep) / across) {
-    for (const Node& node : model_.nodes)
+    for (const model::Node& node : model_.nodes)
       for (int axis = 0; axis < 3; ++axis)
         cost_.unknowns += (node.fixed >> axis & 1) == 0 ? 1 : 0;
     cost_.factor = timing::processor_milliseconds(
@@ -109,9 +110,9 @@ public:
   }
 
 private:
-  Model model_;
+  model::Model model_;
   double cell_; ///< of the touched circle
-  std::optional<Elastostatic> solver_;
+  std::optional<statics::Elastostatic> solver_;
   Cost cost_;
 };
 

@@ -17,8 +17,9 @@
 
 namespace gewebe::validate {
 
-Grid organ_volume(const Organ& organ, double voxel) {
-  return jones_density({}, organ.surface, uniform_transform(voxel), OpenMesh::fill);
+volume::Grid organ_volume(const Organ& organ, double voxel) {
+  return antialiasing::jones_density({}, organ.surface, volume::uniform_transform(voxel),
+                                     voxelization::OpenMesh::fill);
 }
 
 namespace {
@@ -57,7 +58,7 @@ std::array<double, 6> weights(const std::array<Vec3, 3>& corner, const Vec3& cen
 /// What lies above a plane z of a mesh of corners: tetrahedra that it cuts are cut along it, so
 /// that what is held there does not hang on where nodes are. Nodes nearer than `near` are moved
 /// onto it.
-void cut_below(TetMesh& mesh, double plane, double near) {
+void cut_below(tetrahedra::TetMesh& mesh, double plane, double near) {
   for (Vec3& p : mesh.points)
     if (std::abs(p.z - plane) <= near)
       p.z = plane;
@@ -85,7 +86,7 @@ void cut_below(TetMesh& mesh, double plane, double near) {
     // The faces of what is left, and that on the plane from their edges there.
     std::vector<std::vector<std::uint32_t>> faces;
     std::map<std::uint32_t, std::uint32_t> next;
-    for (const auto& corners : tetrahedron_faces) {
+    for (const auto& corners : tetrahedra::tetrahedron_faces) {
       std::vector<std::uint32_t> face;
       for (std::size_t k = 0; k < 3; ++k) {
         const std::uint32_t a = t[corners[k]], b = t[corners[(k + 1) % 3]];
@@ -152,19 +153,20 @@ Organ load_organ(const std::string& file, double unit, double held, const Vec3& 
   return organ;
 }
 
-test::SolidCase organ_case(const Organ& organ, const Grid& volume, double cell, unsigned grade,
-                           bool quadratic, const SolidMaterial& material, Hold hold) {
-  StuffingOptions options;
+test::SolidCase organ_case(const Organ& organ, const volume::Grid& volume, double cell,
+                           unsigned grade, bool quadratic, const fem::SolidMaterial& material,
+                           Hold hold) {
+  stuffing::StuffingOptions options;
   options.cell = cell;
   options.grade = grade;
-  TetMesh mesh = stuff({}, volume, options);
+  tetrahedra::TetMesh mesh = stuffing::stuff({}, volume, options);
   if (hold == Hold::cut)
     cut_below(mesh, organ.plane, 0.05 * cell);
-  (void)keep_components(mesh, {.largest = 1});
+  (void)tetrahedra::keep_components(mesh, {.largest = 1});
   test::SolidCase c{{std::move(mesh), quadratic, {material}}, {}, {}, {}};
   for (std::size_t axis = 0; axis < 3; ++axis)
     c.solid.hold(axis, [&](const Vec3& p) { return p.z <= organ.plane; });
-  const TetBoundary faces = boundary(c.solid.mesh);
+  const tetrahedra::TetBoundary faces = tetrahedra::boundary(c.solid.mesh);
   std::vector<double> weight(c.solid.mesh.points.size());
   double total = 0;
   for (std::size_t t = 0; t < faces.mesh.triangles.size(); ++t) {
@@ -202,8 +204,8 @@ void spleen(Section& section) {
     section.checks.push_back(skipped("spleen", source, "no hubmap_F_spleen_uv.obj"));
     return;
   }
-  const SolidMaterial tissue{5000, 0.45, 1e-3};
-  const Grid volume = organ_volume(organ, 1);
+  const fem::SolidMaterial tissue{5000, 0.45, 1e-3};
+  const volume::Grid volume = organ_volume(organ, 1);
   const auto at = [&](double cell, bool quadratic, Hold hold = Hold::cut) {
     return organ_case(organ, volume, cell, cell > 4.5 ? 0 : 1, quadratic, tissue, hold);
   };
@@ -274,7 +276,7 @@ void liver(Section& section) {
     section.checks.push_back(skipped("liver", source, "no sofa_liver_smooth.obj"));
     return;
   }
-  const SolidMaterial tissue{5000, 0.49, 1e-3};
+  const fem::SolidMaterial tissue{5000, 0.49, 1e-3};
   const auto at = [&](double voxel, double cell, unsigned grade) {
     return figure_of(organ_case(organ, organ_volume(organ, voxel), cell, grade, true, tissue));
   };

@@ -26,7 +26,7 @@ inline constexpr double patch_force = 1e5; ///< g mm/s²: 0.1 N
 Organ load_organ(const std::string& file, double unit, double held, const Vec3& outwards);
 
 /// Its density on voxels of an edge, mm, as `voxelize` makes it.
-Grid organ_volume(const Organ& organ, double voxel);
+volume::Grid organ_volume(const Organ& organ, double voxel);
 
 enum class Hold {
   cut,   ///< tetrahedra are cut along the plane: all below is still
@@ -36,7 +36,8 @@ enum class Hold {
 /// traction t w(r) on the surface within the radius of the patch's centre, w = (1 - (r/R)²)², whose
 /// total is the force; the figure is the mean displacement along it, mm, weighted by w too: the
 /// work of the force over it.
-test::SolidCase organ_case(const Organ& organ, const Grid& volume, double cell, unsigned grade,
-                           bool quadratic, const SolidMaterial& material, Hold hold = Hold::cut);
+test::SolidCase organ_case(const Organ& organ, const volume::Grid& volume, double cell,
+                           unsigned grade, bool quadratic, const fem::SolidMaterial& material,
+                           Hold hold = Hold::cut);
 
 } // namespace gewebe::validate

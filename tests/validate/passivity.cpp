@@ -37,11 +37,11 @@ Vec3 place(double share) {
 }
 
 /// Without what tissue itself loses.
-Model lossless() {
-  Model model = test::organ(3);
-  for (Spring& spring : model.springs)
+model::Model lossless() {
+  model::Model model = test::organ(3);
+  for (model::Spring& spring : model.springs)
     spring.damping = 0;
-  for (Node& node : model.nodes)
+  for (model::Node& node : model.nodes)
     node.drag = 0;
   return model;
 }
@@ -53,28 +53,28 @@ struct Cycle {
   double least = 0; ///< least of what it had given beyond what the object had, at any time
 };
 
-Cycle lead(Method method, Integration integration, double friction, double step) {
-  Simulation s(timing::with_threads(1), {});
+Cycle lead(scene::Method method, scene::Integration integration, double friction, double step) {
+  scene::Simulation s(timing::with_threads(1), {});
   s.add_object("organ", lossless(), method, {}, integration);
-  s.apply(SetTimestep{step});
-  s.apply(SetInstrument{0, {radius, {}, friction}, {place(0), {}}, "probe"});
+  s.apply(scene::SetTimestep{step});
+  s.apply(scene::SetInstrument{0, {radius, {}, friction}, {place(0), {}}, "probe"});
   s.step(0);
   Cycle cycle;
   const auto steps = static_cast<std::size_t>(std::round(duration / step));
   Vec3 last = place(0), force;
   for (std::size_t k = 1; k <= steps; ++k) {
     const Vec3 to = place(static_cast<double>(k) / static_cast<double>(steps));
-    s.apply(MoveInstrument{0, to, {}, method == Method::ffe ? 0 : step});
+    s.apply(scene::MoveInstrument{0, to, {}, method == scene::Method::ffe ? 0 : step});
     s.step(step);
     const Vec3 now = s.instrument(0).force;
     // A dynamic force is the mean over the step, a static one that of its end.
-    cycle.work -= dot(method == Method::ffe ? 0.5 * (force + now) : now, to - last);
+    cycle.work -= dot(method == scene::Method::ffe ? 0.5 * (force + now) : now, to - last);
     force = now;
     last = to;
-    const SimulationState state = s.state();
+    const scene::SimulationState state = s.state();
     cycle.kept = state.kinetic_energy + state.elastic_energy;
     cycle.most = test::larger(cycle.most, cycle.work);
-    if (method != Method::ffe)
+    if (method != scene::Method::ffe)
       cycle.least = test::smaller(cycle.least, cycle.work - cycle.kept);
   }
   return cycle;
@@ -108,13 +108,13 @@ Section passivity() {
             {}};
   struct Way {
     const char* name;
-    Method method;
-    Integration integration;
+    scene::Method method;
+    scene::Integration integration;
     double step, bound;
   };
   const std::array<Way, 2> ways{
-      {{"at rest (ffe)", Method::ffe, Integration::semi_implicit, 1.0 / 50, 2e-5},
-       {"in motion (ela)", Method::ela, Integration::implicit, 1.0 / 50, 0.02}}};
+      {{"at rest (ffe)", scene::Method::ffe, scene::Integration::semi_implicit, 1.0 / 50, 2e-5},
+       {"in motion (ela)", scene::Method::ela, scene::Integration::implicit, 1.0 / 50, 0.02}}};
   constexpr int halvings = 4;
   const auto check = [&](const std::string& what, const std::string& expected, double figure,
                          double error, double bound) {
@@ -149,10 +149,10 @@ Section passivity() {
       }
       check(what + ": the last half step changes it, over the one before", "below 0.6",
             change / before, std::abs(change / before), 0.6);
-      if (way.method != Method::ffe)
+      if (way.method != scene::Method::ffe)
         check(what + ": energy from nowhere at any time", "0", 0 - c.least / c.most,
               0 - c.least / c.most, 1e-3);
-      if (way.integration == Integration::implicit) {
+      if (way.integration == scene::Integration::implicit) {
         const std::string steps = " at any step up to " + text_of(way.step, 2) + " s";
         if (!(friction > 0))
           check(what + ": work that is missing" + steps, "0", worst, worst, 0.3);

@@ -48,11 +48,11 @@ std::optional<Answer> solve_by_peer(const test::SolidCase& c, PeerElement elemen
   if (peer_name().empty())
     return {};
   const Folder folder;
-  const TetMesh& mesh = c.solid.mesh;
+  const tetrahedra::TetMesh& mesh = c.solid.mesh;
   std::vector<double> points, lame, given = c.given;
   for (const Vec3& p : mesh.points)
     points.insert(points.end(), {p.x, p.y, p.z});
-  for (const SolidElement& e : c.solid.elements)
+  for (const fem::SolidElement& e : c.solid.elements)
     lame.insert(lame.end(), {e.material.lambda, e.material.mu});
   given.resize(c.load.size());
   std::vector<std::uint32_t> corners, middles;
@@ -102,7 +102,7 @@ std::optional<Figure> figure_by_peer(const test::SolidCase& c, PeerElement eleme
   return Figure{c.read(c.solid, answer->u), answer->cost};
 }
 
-double difference(const StiffnessMatrix& ours, const PeerMatrix& peers) {
+double difference(const linalg::StiffnessMatrix& ours, const PeerMatrix& peers) {
   if (peers.column_start.size() != ours.column_start.size())
     return HUGE_VAL;
   double most = 0, whole = 0;
@@ -128,12 +128,12 @@ namespace {
 
 /// K of plain quadratic elements, which no solid of ours is made of: on all axes, by sums over
 /// pairs of nodes.
-StiffnessMatrix plain_stiffness(const test::Solid& solid) {
+linalg::StiffnessMatrix plain_stiffness(const test::Solid& solid) {
   std::vector<std::map<std::int64_t, double>> columns(solid.fixed.size());
   for (std::size_t t = 0; t < solid.elements.size(); ++t)
     for (std::size_t a = 0; a < 10; ++a)
       for (std::size_t b = 0; b < 10; ++b) {
-        const SolidBlock block = plain_quadratic_block(solid.elements[t], a, b);
+        const fem::SolidBlock block = fem::plain_quadratic_block(solid.elements[t], a, b);
         for (std::size_t k = 0; k < 9; ++k) {
           const std::size_t row = 3 * std::size_t{solid.node(t, a)} + k / 3,
                             column = 3 * std::size_t{solid.node(t, b)} + k % 3;
@@ -141,7 +141,7 @@ StiffnessMatrix plain_stiffness(const test::Solid& solid) {
             columns[column][static_cast<std::int64_t>(row)] += block[k];
         }
       }
-  StiffnessMatrix k;
+  linalg::StiffnessMatrix k;
   k.column_start.push_back(0);
   for (const auto& column : columns) {
     for (const auto& [row, value] : column) {
@@ -163,7 +163,7 @@ void compare(Section& section, PeerElement element, const std::string& name) {
     section.checks.push_back(skipped("K and u, " + name, source, no_peer));
     return;
   }
-  TetMesh box = test::distorted_box();
+  tetrahedra::TetMesh box = test::distorted_box();
   for (std::size_t t = 0; t < box.tetrahedra.size(); ++t)
     box.material.push_back(t % 3 == 0);
   test::SolidCase c{
@@ -173,10 +173,10 @@ void compare(Section& section, PeerElement element, const std::string& name) {
       {}};
   for (std::size_t axis = 0; axis < 3; ++axis)
     c.solid.hold(axis, [](const Vec3& p) { return p.x == 0; });
-  const TetBoundary faces = boundary(c.solid.mesh);
-  c.load =
-      traction_load(c.solid.mesh, faces,
-                    c.solid.triangles(faces, [](const Vec3& p) { return p.x == 2; }), {3, -5, 7});
+  const tetrahedra::TetBoundary faces = tetrahedra::boundary(c.solid.mesh);
+  c.load = fem::traction_load(c.solid.mesh, faces,
+                              c.solid.triangles(faces, [](const Vec3& p) { return p.x == 2; }),
+                              {3, -5, 7});
   PeerMatrix matrix;
   PeerWish wish{&matrix};
   const auto theirs = solve_by_peer(c, element, &wish);
@@ -189,7 +189,7 @@ void compare(Section& section, PeerElement element, const std::string& name) {
   }
   const Answer ours = solve(c);
   check.cost = ours.cost;
-  check.error = difference(solid_stiffness(c.solid.mesh, c.solid.elements), matrix);
+  check.error = difference(fem::solid_stiffness(c.solid.mesh, c.solid.elements), matrix);
   check.figure = text_of(check.error, 2) + " apart";
   section.checks.push_back(check);
   check.what = "u, " + name;

@@ -41,6 +41,6 @@ inline constexpr const char* no_peer = "no scikit-fem (PYTHON=… says which Pyt
 std::string peer_name();
 
 /// The largest difference of entries over the largest entry. \pre of all axes
-double difference(const StiffnessMatrix& ours, const PeerMatrix& peers);
+double difference(const linalg::StiffnessMatrix& ours, const PeerMatrix& peers);
 
 } // namespace gewebe::validate

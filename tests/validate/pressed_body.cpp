@@ -8,11 +8,12 @@
 
 namespace gewebe::validate {
 
-PressedBody::PressedBody(const Model& model, Elastostatic& solver, const InstrumentShape& shape,
-                         const Pose& start, const contact::Parameters& parameters)
+PressedBody::PressedBody(const model::Model& model, statics::Elastostatic& solver,
+                         const contact::InstrumentShape& shape, const contact::Pose& start,
+                         const contact::Parameters& parameters)
     : model_(model), solver_(solver), shape_(shape), pose_(start), parameters_(parameters),
       body_(contact::model_surface(model)), tool_(contact::instrument_surface(shape)),
-      displacement_(3 * surface_count(model)) {
+      displacement_(3 * model::surface_count(model)) {
   collision::OwnerTable<double> friction(2, -1);
   friction.set(0, 1, shape.friction);
   const std::array<const contact::BodySurface*, 2> surfaces{&body_.surface, &tool_};
@@ -20,15 +21,16 @@ PressedBody::PressedBody(const Model& model, Elastostatic& solver, const Instrum
   steps_.emplace(island_);
 }
 
-bool PressedBody::move(const Pose& to, int halvings) {
+bool PressedBody::move(const contact::Pose& to, int halvings) {
   if (step(to))
     return true;
-  return halvings > 0 && move(between(pose_, to, 0.5), halvings - 1) && move(to, halvings - 1);
+  return halvings > 0 && move(contact::between(pose_, to, 0.5), halvings - 1) &&
+         move(to, halvings - 1);
 }
 
-bool PressedBody::step(const Pose& to) {
-  ElastostaticContactBody body({&model_, &body_, &load_, displacement_, {}, last_},
-                               [this]() -> Elastostatic& { return solver_; });
+bool PressedBody::step(const contact::Pose& to) {
+  statics::ElastostaticContactBody body({&model_, &body_, &load_, displacement_, {}, last_},
+                                        [this]() -> statics::Elastostatic& { return solver_; });
   contact::InstrumentBody tool(tool_.rest, pose_, to, 0, {});
   island_.table.bodies = {&body, &tool};
   try {

@@ -19,12 +19,13 @@ namespace gewebe::validate {
 class PressedBody {
 public:
   /// Keeps references to the model and its solver. \param start  the instrument stands apart there
-  PressedBody(const Model& model, Elastostatic& solver, const InstrumentShape& shape,
-              const Pose& start, const contact::Parameters& parameters = {});
+  PressedBody(const model::Model& model, statics::Elastostatic& solver,
+              const contact::InstrumentShape& shape, const contact::Pose& start,
+              const contact::Parameters& parameters = {});
 
   /// Moves the instrument, in halves of the way where contact is not solved, as ffe-run does.
   /// \return whether it was solved; else the instrument is on its way
-  bool move(const Pose& to) { return move(to, max_halvings); }
+  bool move(const contact::Pose& to) { return move(to, max_halvings); }
 
   struct Force {
     std::uint32_t node = 0;
@@ -36,24 +37,24 @@ public:
   Vec3 force_on_instrument() const;
   /// Of the surface's nodes.
   std::span<const double> displacement() const { return displacement_; }
-  const Pose& pose() const { return pose_; }
+  const contact::Pose& pose() const { return pose_; }
   double activation_distance() const { return island_.activation_distance; }
 
 private:
   static constexpr int max_halvings = 8;
-  bool move(const Pose& to, int halvings);
-  bool step(const Pose& to);
+  bool move(const contact::Pose& to, int halvings);
+  bool step(const contact::Pose& to);
 
-  const Model& model_;
-  Elastostatic& solver_;
-  InstrumentShape shape_;
-  Pose pose_;
+  const model::Model& model_;
+  statics::Elastostatic& solver_;
+  contact::InstrumentShape shape_;
+  contact::Pose pose_;
   contact::Parameters parameters_;
   contact::ModelSurface body_;
   contact::BodySurface tool_;
   contact::Island island_;
   std::optional<contact::StepSolver> steps_;
-  Load load_;
+  contact::Load load_;
   std::vector<double> displacement_;
   std::vector<contact::VertexForce> last_;
   std::vector<Force> forces_;

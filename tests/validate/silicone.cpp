@@ -51,18 +51,18 @@ Vec3 at(const std::vector<double>& u, std::size_t node) {
 
 /// Small strains in frames that turn, with the E that fits all droops best.
 std::vector<double> turned(const test::Solid& solid, const std::vector<double>& load) {
-  std::vector<SolidMaterial> materials = solid.materials;
+  std::vector<fem::SolidMaterial> materials = solid.materials;
   materials[0].young = 270000;
-  const std::vector<SolidElement> elements = solid_elements(solid.mesh, materials);
-  const StiffnessMatrix matrix = solid_stiffness(solid.mesh, elements, solid.fixed);
-  const Factor factor(matrix, {});
-  const RotationWarp warp(solid.mesh, elements, solid.fixed, [&](std::span<double> all) {
+  const std::vector<fem::SolidElement> elements = fem::solid_elements(solid.mesh, materials);
+  const linalg::StiffnessMatrix matrix = fem::solid_stiffness(solid.mesh, elements, solid.fixed);
+  const linalg::Factor factor(matrix, {});
+  const statics::RotationWarp warp(solid.mesh, elements, solid.fixed, [&](std::span<double> all) {
     const std::vector<double> f(all.begin(), all.end());
-    solve_axes(matrix, factor, f, all);
+    linalg::solve_axes(matrix, factor, f, all);
   });
-  const WarpColumns none(warp.surface().nodes().size());
-  const WarpWholeLoad whole = warp.whole_load(load);
-  WarpState state;
+  const statics::WarpColumns none(warp.surface().nodes().size());
+  const statics::WarpWholeLoad whole = warp.whole_load(load);
+  statics::WarpState state;
   warp.answer({.columns = none, .whole = &whole}, state);
   std::vector<double> u(load.size());
   for (std::size_t k = 0; k < state.u.size(); ++k)
@@ -108,24 +108,24 @@ Section silicone() {
     }
     test::SolidCase beam = test::silicone_beam(across, true);
     const test::Solid& solid = beam.solid;
-    SolidVector load =
-        hyperelastic_weight(solid.mesh, solid.materials, solid.elements, {0, 0, -9807.09});
+    fit::SolidVector load =
+        fit::hyperelastic_weight(solid.mesh, solid.materials, solid.elements, {0, 0, -9807.09});
     if (loaded) {
       hang(solid, 510120, across, beam.load);
       hang(solid, 510120, across, load.axes);
     }
     const Answer linear = solve(beam);
-    HyperelasticState bent;
+    fit::HyperelasticState bent;
     Cost cost;
     cost.unknowns = solid.unknowns();
-    HyperelasticOptions options;
+    fit::HyperelasticOptions options;
     options.tolerance = 1e-6;
-    std::vector<SolidElement> elements = solid.elements;
-    for (SolidElement& e : elements)
-      e.law.kind = HyperelasticLaw::neo_hookean;
+    std::vector<fem::SolidElement> elements = solid.elements;
+    for (fem::SolidElement& e : elements)
+      e.law.kind = model::HyperelasticLaw::neo_hookean;
     cost.factor = timing::processor_milliseconds([&] {
-      bent = hyperelastic_statics(solid.mesh, elements, solid.fixed, {}, load, options,
-                                  timing::with_threads(1));
+      bent = fit::hyperelastic_statics(solid.mesh, elements, solid.fixed, {}, load, options,
+                                       timing::with_threads(1));
     });
     Cost turning_cost;
     turning_cost.unknowns = solid.unknowns();

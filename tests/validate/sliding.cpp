@@ -36,10 +36,10 @@ constexpr double young = 10000, poisson = 0.4;
 /// A body, and a way over it.
 struct Body {
   std::string name;
-  Model model;
+  model::Model model;
   double edge = 0;                                      ///< mean one of its triangles, mm
   std::function<std::pair<Vec3, Vec3>(double)> surface; ///< point at a way, mm, and normal there
-  std::shared_ptr<Elastostatic> solver{};
+  std::shared_ptr<statics::Elastostatic> solver{};
 };
 
 /// A way over a ball about 0 that meets edges and nodes in all ways, past its top.
@@ -57,25 +57,27 @@ void finish(Body& body, double held) {
     for (std::size_t k = 0; k < 3; ++k)
       sum += norm(body.model.nodes[t[k]].position - body.model.nodes[t[(k + 1) % 3]].position);
   body.edge = sum / (3 * static_cast<double>(body.model.triangles.size()));
-  for (Node& node : body.model.nodes)
+  for (model::Node& node : body.model.nodes)
     if (node.position.z <= held)
-      node.fixed = fixed_all;
-  body.solver = std::make_shared<Elastostatic>(body.model, nullptr, timing::with_threads(1));
+      node.fixed = model::fixed_all;
+  body.solver =
+      std::make_shared<statics::Elastostatic>(body.model, nullptr, timing::with_threads(1));
 }
 
 Body net() {
   constexpr double radius = 60;
-  BuildOptions options;
+  model::BuildOptions options;
   options.bend = true;
-  Body body{"net",
-            build_model(test::sphere_mesh(4, radius, {}), options, timing::with_threads(1)).model,
-            0, [](double way) { return over_ball(radius, way); }};
+  Body body{
+      "net",
+      model::build_model(test::sphere_mesh(4, radius, {}), options, timing::with_threads(1)).model,
+      0, [](double way) { return over_ball(radius, way); }};
   finish(body, -0.7 * radius);
   return body;
 }
 
-SolidModelOptions tissue(bool quadratic) {
-  SolidModelOptions options;
+fem::SolidModelOptions tissue(bool quadratic) {
+  fem::SolidModelOptions options;
   options.material.materials[0].young = young;
   options.material.materials[0].poisson = poisson;
   options.quadratic = quadratic;
@@ -84,12 +86,13 @@ SolidModelOptions tissue(bool quadratic) {
 
 Body ball() {
   constexpr double radius = 30;
-  StuffingOptions options;
+  stuffing::StuffingOptions options;
   options.cell = 4.5;
-  TetMesh mesh = stuff(timing::with_threads(1),
-                       organ_volume({test::sphere_mesh(5, radius, {}), 0, {}, {}}, 1), options);
-  Body body{"solid ball", solid_model(std::move(mesh), tissue(false), timing::with_threads(1)), 0,
-            [](double way) { return over_ball(radius, way); }};
+  tetrahedra::TetMesh mesh =
+      stuffing::stuff(timing::with_threads(1),
+                      organ_volume({test::sphere_mesh(5, radius, {}), 0, {}, {}}, 1), options);
+  Body body{"solid ball", fem::solid_model(std::move(mesh), tissue(false), timing::with_threads(1)),
+            0, [](double way) { return over_ball(radius, way); }};
   finish(body, -0.7 * radius);
   return body;
 }
@@ -97,12 +100,12 @@ Body ball() {
 Body block(bool quadratic) {
   const std::uint32_t across = quadratic ? 6 : 12;
   const double cell = quadratic ? 8 : 4, height = cell * (quadratic ? 4 : 8);
-  TetMesh mesh = test::box_tetrahedra(across, across, quadratic ? 4 : 8, cell);
+  tetrahedra::TetMesh mesh = test::box_tetrahedra(across, across, quadratic ? 4 : 8, cell);
   const double middle = cell * across / 2;
   for (Vec3& p : mesh.points)
     p -= {middle, middle, height};
   Body body{quadratic ? "quadratic block" : "block",
-            solid_model(std::move(mesh), tissue(quadratic), timing::with_threads(1)), 0,
+            fem::solid_model(std::move(mesh), tissue(quadratic), timing::with_threads(1)), 0,
             [](double way) {
               const double turn = 0.35;
               return std::pair(Vec3{way * std::cos(turn), way * std::sin(turn), 0}, Vec3{0, 0, 1});
@@ -128,12 +131,12 @@ void worse(double& worst, double one) {
 
 /// What one step's forces violate.
 void judge(const PressedBody& pressed, const Body& body, std::span<const double> before,
-           const InstrumentShape& shape, const Pose& from, Slide& slide) {
+           const contact::InstrumentShape& shape, const contact::Pose& from, Slide& slide) {
   const std::span<const double> now = pressed.displacement();
   std::vector<double> u(3 * body.model.nodes.size());
   std::ranges::copy(now, u.begin());
   worse(slide.depth, test::surface_depth(body.model, u, shape, pressed.pose()));
-  const PlacedInstrument placed(shape, pressed.pose());
+  const contact::PlacedInstrument placed(shape, pressed.pose());
   // Sums over nodes are those over pairs of a force each: of normal forces f along the radius d,
   // f d; of friction t across it, the torque d t.
   double largest = 0, work = 0, reach = 0;
@@ -157,16 +160,16 @@ void judge(const PressedBody& pressed, const Body& body, std::span<const double>
 /// Pressed in at the beginning of the way, then slid. \param length of a capsule's segment
 Slide slide(const Body& body, double radius, double friction, double length, double way) {
   Slide result;
-  const InstrumentShape shape{radius, {0.8 * length, -0.6 * length, 0}, friction};
+  const contact::InstrumentShape shape{radius, {0.8 * length, -0.6 * length, 0}, friction};
   const auto pose = [&](double depth, double at) {
     const auto [point, normal] = body.surface(at);
-    return Pose{point + (radius - depth) * normal - 0.5 * shape.axis, {}};
+    return contact::Pose{point + (radius - depth) * normal - 0.5 * shape.axis, {}};
   };
   PressedBody pressed(body.model, *body.solver, shape,
                       pose(-0.01 * radius - 0.5 * length, -way / 2));
-  const auto go = [&](const Pose& to) {
+  const auto go = [&](const contact::Pose& to) {
     const std::vector<double> before(pressed.displacement().begin(), pressed.displacement().end());
-    const Pose from = pressed.pose();
+    const contact::Pose from = pressed.pose();
     ++result.steps;
     if (!pressed.move(to))
       ++result.failed;

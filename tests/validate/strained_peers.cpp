@@ -32,7 +32,7 @@ double processor_ms() {
 
 /// A box held at x = 0, drawn and sheared at the other end.
 struct StrainedBox {
-  TetMesh mesh = test::distorted_box();
+  tetrahedra::TetMesh mesh = test::distorted_box();
   std::vector<std::uint8_t> held = std::vector<std::uint8_t>(3 * mesh.points.size());
   std::vector<double> load = std::vector<double>(3 * mesh.points.size());
 
@@ -54,14 +54,15 @@ struct Shape {
   double ms = 0;
 };
 
-Shape ours(const StrainedBox& box, const HyperelasticLaw& law) {
+Shape ours(const StrainedBox& box, const model::HyperelasticLaw& law) {
   const double start = processor_ms();
-  SolidMotionOptions options;
-  options.law = SolidLaw::hyperelastic;
+  integrator::SolidMotionOptions options;
+  options.law = integrator::SolidLaw::hyperelastic;
   options.tolerance = 1e-10;
   options.max_rounds = 400;
   options.recover = false;
-  SolidMotion motion(box.mesh, std::array{SolidMaterial{young, poisson, 1e-3, law, {}}}, options);
+  integrator::SolidMotion motion(
+      box.mesh, std::array{fem::SolidMaterial{young, poisson, 1e-3, law, {}}}, options);
   motion.hold(box.held);
   motion.set_load(box.load);
   (void)motion.settle({});
@@ -69,7 +70,7 @@ Shape ours(const StrainedBox& box, const HyperelasticLaw& law) {
 }
 
 /// Nothing where there is no FElupe.
-Shape theirs(const StrainedBox& box, const std::string& name, const HyperelasticLaw& law) {
+Shape theirs(const StrainedBox& box, const std::string& name, const model::HyperelasticLaw& law) {
   const Folder folder;
   std::vector<double> points;
   std::vector<std::uint32_t> corners;
@@ -102,11 +103,11 @@ Section strained_peers() {
       {},
       {}};
   const StrainedBox box;
-  for (const auto& [name, law] :
-       {std::pair<std::string, HyperelasticLaw>{"neo-hookean", {HyperelasticLaw::yeoh, {}}},
-        {"mooney-rivlin", {HyperelasticLaw::mooney_rivlin, {0.2}}},
-        {"yeoh", {HyperelasticLaw::yeoh, {0.1, 0.02}}},
-        {"ogden", {HyperelasticLaw::ogden, {5, -2.6, 0.4}}}}) {
+  for (const auto& [name, law] : {std::pair<std::string, model::HyperelasticLaw>{
+                                      "neo-hookean", {model::HyperelasticLaw::yeoh, {}}},
+                                  {"mooney-rivlin", {model::HyperelasticLaw::mooney_rivlin, {0.2}}},
+                                  {"yeoh", {model::HyperelasticLaw::yeoh, {0.1, 0.02}}},
+                                  {"ogden", {model::HyperelasticLaw::ogden, {5, -2.6, 0.4}}}}) {
     const std::string what = "shape, " + name;
     const Shape other = theirs(box, name, law);
     if (other.u.empty()) {

@@ -95,19 +95,20 @@ std::vector<double> hung(const test::Solid& solid, double weight) {
 
 /// The marker stands 6 mm above the middle of the edge, carried by the end.
 Path simulated(const test::Solid& solid, double weight, double frequency, Cost& cost) {
-  SolidMotionOptions options;
-  options.damping = damping_per_stiffness(ratio - 3 * frequency * step, frequency);
+  integrator::SolidMotionOptions options;
+  options.damping = integrator::damping_per_stiffness(ratio - 3 * frequency * step, frequency);
   constexpr double gravity = -9807.09; // mm/s²
   const std::vector<double> more = hung(solid, weight);
-  std::vector<double> masses = solid_masses(solid.mesh, solid.materials);
+  std::vector<double> masses = fem::solid_masses(solid.mesh, solid.materials);
   std::vector<double> load =
-      gravity_load(solid.mesh, solid.materials, solid.elements, {0, 0, gravity});
+      fem::gravity_load(solid.mesh, solid.materials, solid.elements, {0, 0, gravity});
   for (std::size_t n = 0; n < masses.size(); ++n) {
     masses[n] += more[n];
     load[3 * n + 2] += more[n] * gravity;
   }
-  SolidMotion moving(solid.mesh, solid.materials, SolidNet{.masses = masses}, options,
-                     timing::with_threads(1));
+  integrator::SolidMotion moving(solid.mesh, solid.materials,
+                                 integrator::SolidNet{.masses = masses}, options,
+                                 timing::with_threads(1));
   moving.hold(solid.fixed);
   moving.set_load(load);
   const auto place = [&](std::size_t node) {
@@ -177,13 +178,13 @@ Section swings() {
       continue;
     }
     const Path first = from_its_start(*a), second = from_its_start(*b);
-    const SwingFit of_first = fit_swing(first.time, first.down),
-                   of_second = fit_swing(second.time, second.down);
+    const fit::SwingFit of_first = fit::fit_swing(first.time, first.down),
+                        of_second = fit::fit_swing(second.time, second.down);
     const double frequency = (of_first.frequency + of_second.frequency) / 2,
                  rest = (of_first.rest + of_second.rest) / 2;
     Cost cost;
     const Path ours = from_its_start(simulated(beam(), loaded ? 52 : 0, frequency, cost));
-    const SwingFit fit = fit_swing(ours.time, ours.down);
+    const fit::SwingFit fit = fit::fit_swing(ours.time, ours.down);
     const auto check = [&](const std::string& of, double reference, double found, double bound) {
       section.checks.push_back({of + ", " + what,
                                 source,

@@ -26,7 +26,7 @@ namespace {
 
 /// Exceptions that cannot be caught: thrown where a library is loaded or one of its threads begins.
 [[noreturn]] void end_suddenly() {
-  remove_temporaries();
+  formats::remove_temporaries();
   std::string text = "a fault of this program, please report it";
   try {
     if (const std::exception_ptr thrown = std::current_exception())
@@ -40,14 +40,14 @@ namespace {
 }
 
 void write_text(const std::string& path, const std::string& text) {
-  Output output(path, {.binary = false});
+  formats::Output output(path, {.binary = false});
   output.write(text);
   output.commit();
 }
 
 /// Before the first constructor of any library: closed streams, and uncaught exceptions.
 void begin_program(int /*argc*/, char** /*argv*/, char** /*environment*/) {
-  hold_standard_streams();
+  formats::hold_standard_streams();
   std::set_terminate(end_suddenly);
 }
 
@@ -60,7 +60,7 @@ __attribute__((section(".preinit_array"), used)) void (*const early)(int, char**
 
 // ---- Run
 
-Output::Options Run::output_options(bool binary) const {
+formats::Output::Options Run::output_options(bool binary) const {
   return {.keep_unchanged = keep_unchanged_, .binary = binary};
 }
 
@@ -118,7 +118,7 @@ Program::~Program() = default;
 
 namespace {
 std::string default_text(double value) {
-  return number_text(value);
+  return text::number_text(value);
 }
 std::string default_text(std::int64_t value) {
   return std::to_string(value);
@@ -127,7 +127,8 @@ std::string default_text(const std::string& value) {
   return value;
 }
 std::string default_text(const Vec3& value) {
-  return number_text(value.x) + "," + number_text(value.y) + "," + number_text(value.z);
+  return text::number_text(value.x) + "," + text::number_text(value.y) + "," +
+         text::number_text(value.z);
 }
 template <class T> // a list, or what has no default
 std::string default_text(const T& /*value*/) {
@@ -150,7 +151,7 @@ OptionRef Program::option(const std::string& names, T& value, const std::string&
   Spec& spec = state_->add(names, metavar, help);
   spec.default_text = default_text(value);
   spec.value_type = value_type<T>();
-  if constexpr (std::is_same_v<T, Vec3> || std::is_same_v<T, std::optional<Vec3>>)
+  if constexpr (std::is_same_v<T, gewebe::Vec3> || std::is_same_v<T, std::optional<gewebe::Vec3>>)
     spec.list_count = 3;
   spec.set = [&spec, &value](std::string_view word) { spec.read(word, value); };
   return OptionRef(&spec);
@@ -187,25 +188,25 @@ void Program::operands(const std::string& name, std::vector<std::string>& values
 }
 
 namespace {
-std::vector<std::string> kind_words(const std::vector<Kind>& kinds) {
+std::vector<std::string> kind_words(const std::vector<formats::Kind>& kinds) {
   std::vector<std::string> words;
-  for (const Kind kind : kinds)
-    words.emplace_back(kind_name(kind));
-  if (std::ranges::find(kinds, Kind::ply) != kinds.end())
+  for (const formats::Kind kind : kinds)
+    words.emplace_back(formats::kind_name(kind));
+  if (std::ranges::find(kinds, formats::Kind::ply) != kinds.end())
     words.emplace_back("mesh");
   return words;
 }
 } // namespace
 
-void Program::output_kinds(const std::vector<Kind>& kinds) {
+void Program::output_kinds(const std::vector<formats::Kind>& kinds) {
   option("--to", state_->to, "KIND",
-         "kind of the output, overrides its suffix: " + kind_list(kinds))
+         "kind of the output, overrides its suffix: " + formats::kind_list(kinds))
       .one_of(kind_words(kinds));
 }
 
-void Program::input_kinds(const std::vector<Kind>& kinds) {
+void Program::input_kinds(const std::vector<formats::Kind>& kinds) {
   option("--format", state_->format, "KIND",
-         "kind of an input that has neither magic bytes nor suffix: " + kind_list(kinds))
+         "kind of an input that has neither magic bytes nor suffix: " + formats::kind_list(kinds))
       .one_of(kind_words(kinds));
 }
 
@@ -314,9 +315,9 @@ void Program::carry_out(const std::function<void(Run&)>& work) {
     run.progress_bar_ = &*bar;
     run.context_.progress = [&bar](double done) { bar->update(done); };
   }
-  std::optional<Output> stats_output; // before the work, so that a clash of names ends it
+  std::optional<formats::Output> stats_output; // before the work, so that a clash of names ends it
   if (!s.stats_file.empty())
-    stats_output.emplace(s.stats_file, Output::Options{.binary = false, .beside = true});
+    stats_output.emplace(s.stats_file, formats::Output::Options{.binary = false, .beside = true});
   work(run);
   run.progress_bar_ = nullptr;
   bar.reset();
@@ -336,8 +337,8 @@ void Program::carry_out(const std::function<void(Run&)>& work) {
 
 int Program::run(int argc, char** argv, const std::function<void(Run&)>& work) {
   const std::string& tool = state_->line.tool;
-  install_signal_cleanup();
-  guard_files();
+  formats::install_signal_cleanup();
+  formats::guard_files();
   try {
     if (parse({argv + 1, argv + argc})) {
       prepare_run();

@@ -65,7 +65,7 @@ public:
   const std::string& output() const { return output_; } ///< -o, "-" for standard output
   const std::string& to() const { return to_; }         ///< --to, "" if absent
   const std::string& format() const { return format_; } ///< --format, "" if absent
-  Output::Options output_options(bool binary) const;
+  formats::Output::Options output_options(bool binary) const;
   bool verbose() const { return verbose_; }
   bool quiet() const { return quiet_; }
   /// Whether --stats was given: figures that cost a pass over the result are worth it only then.
@@ -150,8 +150,8 @@ public:
   void operands(const std::string& name, std::vector<std::string>& values, const std::string& help,
                 std::size_t min_count);
   /// Declares --to (kinds that this tool writes) and/or --format (kinds that it reads).
-  void output_kinds(const std::vector<Kind>& kinds);
-  void input_kinds(const std::vector<Kind>& kinds);
+  void output_kinds(const std::vector<formats::Kind>& kinds);
+  void input_kinds(const std::vector<formats::Kind>& kinds);
   /// Whether the command line has the option of that long name, for checks. \pre it is declared
   bool given(std::string_view name) const;
   /// Cross-option checks, run after parsing; throw UsageError.

@@ -1,18 +1,21 @@
 #include "tools/cli/filling_rule.h"
 
-namespace gewebe {
+namespace gewebe::cli {
 
-VoxelRule voxel_rule_from_text(const std::string& text) {
-  return text == "winding"   ? VoxelRule::winding
-         : text == "zbuffer" ? VoxelRule::zbuffer
-                             : VoxelRule::parity;
+voxelization::VoxelRule voxel_rule_from_text(const std::string& text) {
+  return text == "winding"   ? voxelization::VoxelRule::winding
+         : text == "zbuffer" ? voxelization::VoxelRule::zbuffer
+                             : voxelization::VoxelRule::parity;
 }
 
-OpenMesh open_mesh_from_text(const std::string& text) {
-  return text == "error" ? OpenMesh::refuse : text == "warn" ? OpenMesh::skip : OpenMesh::fill;
+voxelization::OpenMesh open_mesh_from_text(const std::string& text) {
+  return text == "error"  ? voxelization::OpenMesh::refuse
+         : text == "warn" ? voxelization::OpenMesh::skip
+                          : voxelization::OpenMesh::fill;
 }
 
-std::string mesh_defects(const VoxelizeReport& mesh, const VoxelizeOptions& options) {
+std::string mesh_defects(const voxelization::VoxelizeReport& mesh,
+                         const voxelization::VoxelizeOptions& options) {
   std::string text;
   const auto add = [&](std::uint64_t count, const char* one, const char* many) {
     if (count > 0)
@@ -20,9 +23,9 @@ std::string mesh_defects(const VoxelizeReport& mesh, const VoxelizeOptions& opti
   };
   const bool open = mesh.boundary_edges > 0;
   add(mesh.boundary_edges, "boundary edge", "boundary edges");
-  if (open && options.on_open == OpenMesh::fill)
+  if (open && options.on_open == voxelization::OpenMesh::fill)
     add(mesh.holes, "hole closed", "holes closed");
-  else if (open && options.rule == VoxelRule::parity)
+  else if (open && options.rule == voxelization::VoxelRule::parity)
     text += ", " + std::to_string(mesh.odd_rays) + " odd rays left empty";
   else
     add(mesh.holes, "hole", "holes");
@@ -32,4 +35,4 @@ std::string mesh_defects(const VoxelizeReport& mesh, const VoxelizeOptions& opti
   return text.empty() ? text : (open ? "the mesh is open: " : "the mesh had ") + text;
 }
 
-} // namespace gewebe
+} // namespace gewebe::cli

@@ -5,13 +5,14 @@
 
 #include <string>
 
-namespace gewebe {
+namespace gewebe::cli {
 
 /// --rule and --on-open. \pre one of their words
-VoxelRule voxel_rule_from_text(const std::string& text);
-OpenMesh open_mesh_from_text(const std::string& text);
+voxelization::VoxelRule voxel_rule_from_text(const std::string& text);
+voxelization::OpenMesh open_mesh_from_text(const std::string& text);
 
 /// What is wrong with a mesh that was voxelized, for a warning; "" if nothing.
-std::string mesh_defects(const VoxelizeReport& mesh, const VoxelizeOptions& options);
+std::string mesh_defects(const voxelization::VoxelizeReport& mesh,
+                         const voxelization::VoxelizeOptions& options);
 
-} // namespace gewebe
+} // namespace gewebe::cli

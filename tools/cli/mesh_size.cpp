@@ -10,11 +10,11 @@ void warn_of_size(Run& run, const std::string& name, const TriangleMesh& mesh,
   if (!(longest > 0))
     return;
   if (voxel && longest < 20 * *voxel)
-    run.warn(name + ": the mesh is " + rounded_text(longest / *voxel) +
+    run.warn(name + ": the mesh is " + text::rounded_text(longest / *voxel) +
              " voxels long, expected 20 or more: a smaller voxel, or --unit if its numbers are not "
              "mm");
   else if (longest > 1000 || (!voxel && longest < 1))
-    run.warn(name + ": the mesh is " + rounded_text(longest) +
+    run.warn(name + ": the mesh is " + text::rounded_text(longest) +
              " mm long, expected an organ of 1 mm to 1 m: --unit says what its numbers mean");
 }
 

@@ -16,7 +16,7 @@ namespace {
 template <class Number>
 Number parse_number(const std::string& name, std::string_view word) {
   Number value{};
-  const std::string_view digits = without_plus(word);
+  const std::string_view digits = text::without_plus(word);
   const char* const end = digits.data() + digits.size();
   const auto [rest, status] = std::from_chars(digits.data(), end, value);
   if (status != std::errc{} || rest != end)
@@ -47,10 +47,10 @@ bool Spec::is_named(std::string_view name) const {
 
 void Spec::check(double value) const {
   if (must_be_positive && !(value > 0))
-    throw UsageError(long_name() + ": expected more than 0, not " + number_text(value));
+    throw UsageError(long_name() + ": expected more than 0, not " + text::number_text(value));
   if (min && !(value >= *min && value <= *max))
-    throw UsageError(long_name() + ": expected " + number_text(*min) + " to " + number_text(*max) +
-                     ", not " + number_text(value));
+    throw UsageError(long_name() + ": expected " + text::number_text(*min) + " to " +
+                     text::number_text(*max) + ", not " + text::number_text(value));
 }
 
 void Spec::read(std::string_view word, double& value) const {
@@ -207,7 +207,7 @@ void CommandLine::check_complete() const {
   if (!unexpected_.empty()) {
     const std::string& wrong = unexpected_.front();
     refuse("unexpected argument '" + wrong + "'" +
-           suggestion(wrong.substr(0, wrong.find('=')), long_names()));
+           text::suggestion(wrong.substr(0, wrong.find('=')), long_names()));
   }
   for (const Operand& operand : operands)
     if (operand.count < operand.min_count)

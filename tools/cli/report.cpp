@@ -5,10 +5,10 @@
 
 namespace gewebe::cli {
 
-void report_volume(Run& run, const Grid& grid) {
+void report_volume(Run& run, const volume::Grid& grid) {
   if (!run.stats_wanted())
     return;
-  const VolumeStats volume = volume_stats(run.context(), grid);
+  const volume::VolumeStats volume = volume::volume_stats(run.context(), grid);
   Stats& stats = run.stats();
   stats.set("voxel_size", grid.info().transform.voxel_size());
   stats.set("isovalue", grid.info().isovalue);

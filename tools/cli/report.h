@@ -8,6 +8,6 @@ namespace gewebe::cli {
 
 /// Adds voxel size, leaves, tiles, active and inside voxels, volume, box, min, max and digest of
 /// the grid. Costs a pass over the volume, so call it only for --stats.
-void report_volume(Run& run, const Grid& grid);
+void report_volume(Run& run, const volume::Grid& grid);
 
 } // namespace gewebe::cli

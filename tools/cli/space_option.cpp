@@ -1,6 +1,6 @@
 #include "tools/cli/space_option.h"
 
-namespace gewebe {
+namespace gewebe::cli {
 
 void declare_space(cli::Program& program, std::string& space) {
   program.option("--space", space, "SPACE", "space of the result: ras or lps")
@@ -11,8 +11,8 @@ Space result_space(Space from, const std::string& option) {
   return option.empty() ? from : space_from_name(option);
 }
 
-GridTransform other_space(const GridTransform& transform) {
-  GridTransform turned = transform;
+volume::GridTransform other_space(const volume::GridTransform& transform) {
+  volume::GridTransform turned = transform;
   for (std::size_t n = 0; n < 8; ++n) // the rows of x and y
     turned.m[n] = 0 - turned.m[n];    // which gives no -0
   return turned;
@@ -31,4 +31,4 @@ void warn_of_spaces(cli::Run& run, const std::string& first_name, Space first,
     run.warn(two_spaces_text(first_name, first, name, space));
 }
 
-} // namespace gewebe
+} // namespace gewebe::cli

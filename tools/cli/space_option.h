@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::cli {
 
 /// Declares --space ras|lps.
 void declare_space(cli::Program& program, std::string& space);
@@ -18,7 +18,7 @@ void declare_space(cli::Program& program, std::string& space);
 Space result_space(Space from, const std::string& option);
 
 /// The transform to the other space.
-GridTransform other_space(const GridTransform& transform);
+volume::GridTransform other_space(const volume::GridTransform& transform);
 
 /// A warning that two inputs are in different spaces.
 std::string two_spaces_text(const std::string& first_name, Space first, const std::string& name,
@@ -28,4 +28,4 @@ std::string two_spaces_text(const std::string& first_name, Space first, const st
 void warn_of_spaces(cli::Run& run, const std::string& first_name, Space first,
                     const std::string& name, Space space);
 
-} // namespace gewebe
+} // namespace gewebe::cli

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <array>
 
-namespace gewebe {
+namespace gewebe::cli {
 
 namespace {
 
@@ -103,4 +103,4 @@ std::string_view way_to(std::string_view task) {
   return found == tasks.end() ? std::string_view() : found->how;
 }
 
-} // namespace gewebe
+} // namespace gewebe::cli

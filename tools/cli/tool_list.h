@@ -6,7 +6,7 @@
 #include <string_view>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::cli {
 
 struct ToolExample {
   std::string_view what, command;
@@ -22,4 +22,4 @@ std::string tool_list();
 /// Advice for a task that no program is named after, empty for other words.
 std::string_view way_to(std::string_view task);
 
-} // namespace gewebe
+} // namespace gewebe::cli

@@ -8,7 +8,7 @@
 #include <utility>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::cli {
 namespace {
 
 void move_points(const Affine& map, std::vector<Vec3>& points) {
@@ -85,7 +85,7 @@ Affine transform_from_text(const std::string& text) {
       } catch (const Error& error) {
         throw UsageError(std::string("--transform: ") + error.what());
       }
-  Input input(text, false);
+  formats::Input input(text, false);
   return at(input.name(), [&] { return parse_affine_matrix(input.read_all(1U << 20U)); });
 }
 
@@ -102,17 +102,17 @@ void apply(const Affine& map, TriangleMesh& mesh) {
   }
 }
 
-void apply(const Affine& map, TetMesh& mesh) {
+void apply(const Affine& map, tetrahedra::TetMesh& mesh) {
   move_points(map, mesh.points);
   if (map.determinant() < 0)
     turn_over(mesh.tetrahedra, mesh.middles);
 }
 
-void apply(const Affine& map, Model& model) {
+void apply(const Affine& map, model::Model& model) {
   if (!map.is_rigid())
     throw Error("--transform: the masses and stiffness of a model depend on its size, expected no "
                 "scale or shear, or the transform of the mesh that it is made of");
-  for (Node& node : model.nodes) {
+  for (model::Node& node : model.nodes) {
     node.position = map(node.position);
     node.fixed = turned_axes(map, node.fixed);
     if (!is_finite(node.position))
@@ -130,4 +130,4 @@ void apply(const Affine& map, Model& model) {
   }
 }
 
-} // namespace gewebe
+} // namespace gewebe::cli

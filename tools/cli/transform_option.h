@@ -9,7 +9,7 @@
 
 #include <string>
 
-namespace gewebe {
+namespace gewebe::cli {
 
 /// Declares --transform.
 void declare_transform(cli::Program& program, std::string& transform);
@@ -21,9 +21,9 @@ Affine transform_from_text(const std::string& text);
 /// Faces and elements of what is mirrored keep their outside. \throw Error if a coordinate is not
 /// finite afterwards
 void apply(const Affine& map, TriangleMesh& mesh);
-void apply(const Affine& map, TetMesh& mesh);
+void apply(const Affine& map, tetrahedra::TetMesh& mesh);
 /// \throw Error also if the map changes lengths, on which masses and stiffness depend, or turns an
 /// axis that a node is held along out of the axes
-void apply(const Affine& map, Model& model);
+void apply(const Affine& map, model::Model& model);
 
-} // namespace gewebe
+} // namespace gewebe::cli

@@ -30,11 +30,11 @@ extern "C" const char gewebe_commit[] __attribute__((weak)); // of programs, see
 namespace openvdb::OPENVDB_VERSION_NAME {
 void initialize() __attribute__((weak));
 }
-namespace gewebe { // CGAL is headers alone: it is there with what uses them
+namespace gewebe::cli { // CGAL is headers alone: it is there with what uses them
 // NOLINTNEXTLINE(readability-redundant-declaration): it makes the reference weak
-RepairReport repair_mesh(TriangleMesh& mesh, const RepairOptions& options, const Context& context)
-    __attribute__((weak));
-} // namespace gewebe
+repair::RepairReport repair_mesh(TriangleMesh& mesh, const repair::RepairOptions& options,
+                                 const Context& context) __attribute__((weak));
+} // namespace gewebe::cli
 
 namespace gewebe::cli {
 namespace {
@@ -50,7 +50,7 @@ std::string libraries() {
   };
   if (aiGetVersionMajor != nullptr)
     add("assimp", dotted(aiGetVersionMajor(), aiGetVersionMinor(), aiGetVersionPatch()));
-  if (repair_mesh != nullptr)
+  if (repair::repair_mesh != nullptr)
     add("CGAL", CGAL_VERSION_STR);
   if (cholmod_version != nullptr) {
     std::array<int, 3> version{};

@@ -9,7 +9,7 @@
 #include <string>
 #include <utility>
 
-namespace gewebe {
+namespace gewebe::cli {
 namespace {
 
 /// How many voxels away from a tetrahedron its label may be. The smooth surface of labels lies
@@ -17,8 +17,8 @@ namespace {
 constexpr std::int32_t label_reach = 3;
 
 /// The materials of a source in the other space.
-MaterialSource in_other_space(MaterialSource source) {
-  return [source = std::move(source)]() -> MaterialAt {
+stuffing::MaterialSource in_other_space(stuffing::MaterialSource source) {
+  return [source = std::move(source)]() -> stuffing::MaterialAt {
     return [at = source()](const Vec3& place) { return at(other_space(place)); };
   };
 }
@@ -28,8 +28,8 @@ MaterialSource in_other_space(MaterialSource source) {
 MaterialVolumes::MaterialVolumes(const MeshArguments& arguments) {
   const std::vector<std::string> paths = material_paths(arguments);
   for (const std::string& path : paths) {
-    Input& input = inputs.emplace_back(path);
-    is_labels = is_label_volume(input.peek(4096));
+    formats::Input& input = inputs.emplace_back(path);
+    is_labels = formats::is_label_volume(input.peek(4096));
     if (is_labels && paths.size() > 1)
       throw Error(input.name(), "is a label volume, expected it alone in --materials");
     if (!is_labels && !arguments.labels.empty())
@@ -40,44 +40,44 @@ MaterialVolumes::MaterialVolumes(const MeshArguments& arguments) {
 }
 
 void MaterialVolumes::read(cli::Run& run, Space space) {
-  for (Input& input : inputs) {
+  for (formats::Input& input : inputs) {
     Space own = Space::ras; // of labels, as they are read
     if (is_labels) {
-      AllLabels all = read_all_labels(input, wanted, run.context());
+      formats::AllLabels all = formats::read_all_labels(input, wanted, run.context());
       for (const std::string& warning : all.warnings)
         run.warn(warning);
       labels = std::move(all.voxels);
     } else {
       own = Space::unknown;
-      volumes.push_back(read_volume(input, run.context(), &own));
+      volumes.push_back(formats::read_volume(input, run.context(), &own));
     }
     turned.push_back(spaces_differ(own, space));
   }
 }
 
-MaterialSource MaterialVolumes::source(const Grid& solid, double isovalue) const {
+stuffing::MaterialSource MaterialVolumes::source(const volume::Grid& solid, double isovalue) const {
   if (inputs.empty())
     return {};
   if (is_labels)
     return at(inputs.front().name(), [&] {
-      MaterialSource tissue;
+      stuffing::MaterialSource tissue;
       if (wanted.empty()) {
-        tissue = inside_source(solid, isovalue);
+        tissue = stuffing::inside_source(solid, isovalue);
         if (turned.front())
           tissue = in_other_space(std::move(tissue));
       }
-      MaterialSource source = label_source(labels, label_reach, tissue);
+      stuffing::MaterialSource source = stuffing::label_source(labels, label_reach, tissue);
       return turned.front() ? in_other_space(std::move(source)) : source;
     });
-  std::vector<MaterialSource> sources;
+  std::vector<stuffing::MaterialSource> sources;
   for (std::size_t n = 0; n < volumes.size(); ++n)
     sources.push_back(at(inputs[n].name(), [&] {
-      MaterialSource source = inside_source(volumes[n]);
+      stuffing::MaterialSource source = stuffing::inside_source(volumes[n]);
       return turned[n] ? in_other_space(std::move(source)) : source;
     }));
-  return [this, sources]() -> MaterialAt {
-    std::vector<MaterialAt> inside;
-    for (const MaterialSource& source : sources)
+  return [this, sources]() -> stuffing::MaterialAt {
+    std::vector<stuffing::MaterialAt> inside;
+    for (const stuffing::MaterialSource& source : sources)
       inside.push_back(source());
     return [this, inside](const Vec3& place) {
       std::int32_t material = 0;
@@ -89,4 +89,4 @@ MaterialSource MaterialVolumes::source(const Grid& solid, double isovalue) const
   };
 }
 
-} // namespace gewebe
+} // namespace gewebe::cli

@@ -12,7 +12,7 @@
 
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::cli {
 
 /// The volumes of --materials, opened before the work: one of labels, or any number of others.
 struct MaterialVolumes {
@@ -21,14 +21,14 @@ struct MaterialVolumes {
   /// \param space  of the positions given to source()
   void read(cli::Run& run, Space space);
   /// Nothing where there are none. \pre read; `solid`, which is meshed at `isovalue`, outlives it
-  MaterialSource source(const Grid& solid, double isovalue) const;
+  stuffing::MaterialSource source(const volume::Grid& solid, double isovalue) const;
 
-  std::vector<Input> inputs;
+  std::vector<formats::Input> inputs;
   bool is_labels = false;
-  std::vector<LabelRange> wanted; ///< of the labels; empty: all
-  LabelRuns labels;
-  std::vector<Grid> volumes;
+  std::vector<formats::LabelRange> wanted; ///< of the labels; empty: all
+  labels::LabelRuns labels;
+  std::vector<volume::Grid> volumes;
   std::vector<bool> turned; ///< per input: it is in the other space
 };
 
-} // namespace gewebe
+} // namespace gewebe::cli

@@ -9,7 +9,7 @@
 
 #include <algorithm>
 
-namespace gewebe {
+namespace gewebe::cli {
 
 void check(const MeshArguments& arguments) {
   component_choice(arguments.components);
@@ -27,7 +27,7 @@ void check(const MeshArguments& arguments) {
   if (!arguments.refine.empty() && arguments.interface == "follow")
     throw UsageError("--refine: refined cells can't follow the interface between materials, "
                      "expected --interface stair");
-  for (const RefinedRegion& region : refined_regions(arguments))
+  for (const tetrahedra::RefinedRegion& region : refined_regions(arguments))
     if (!region.materials.empty() && arguments.materials.empty())
       throw UsageError("--refine '" + region.text + "': label is for --materials, expected both");
   if (!arguments.labels.empty() && arguments.materials.empty())
@@ -48,11 +48,11 @@ void check(const MeshArguments& arguments) {
   cli::check_one_pipe(inputs);
 }
 
-std::vector<RefinedRegion> refined_regions(const MeshArguments& arguments) {
+std::vector<tetrahedra::RefinedRegion> refined_regions(const MeshArguments& arguments) {
   if (arguments.refine.empty())
     return {};
   try {
-    return parse_refinement(arguments.refine);
+    return tetrahedra::parse_refinement(arguments.refine);
   } catch (const Error& error) {
     throw UsageError(std::string("--refine: ") + error.what());
   }
@@ -71,12 +71,12 @@ std::vector<std::string> material_paths(const MeshArguments& arguments) {
   return paths;
 }
 
-std::vector<Kind> writable_kinds() {
-  std::vector<Kind> kinds = writable_mesh_kinds();
-  for (const Kind kind : writable_tet_kinds())
+std::vector<formats::Kind> writable_kinds() {
+  std::vector<formats::Kind> kinds = formats::writable_mesh_kinds();
+  for (const formats::Kind kind : formats::writable_tet_kinds())
     if (std::find(kinds.begin(), kinds.end(), kind) == kinds.end())
       kinds.push_back(kind);
   return kinds;
 }
 
-} // namespace gewebe
+} // namespace gewebe::cli

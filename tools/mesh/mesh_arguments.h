@@ -9,7 +9,7 @@
 #include <string>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::cli {
 
 struct MeshArguments {
   std::string volume = "-", place, components, materials, interface, labels, space, refine;
@@ -23,12 +23,12 @@ struct MeshArguments {
 void check(const MeshArguments& arguments);
 
 /// The regions of --refine. \throw UsageError for a wrong text
-std::vector<RefinedRegion> refined_regions(const MeshArguments& arguments);
+std::vector<tetrahedra::RefinedRegion> refined_regions(const MeshArguments& arguments);
 
 /// The files of --materials. \throw UsageError if one has no name
 std::vector<std::string> material_paths(const MeshArguments& arguments);
 
 /// The kinds of surfaces and of tetrahedra.
-std::vector<Kind> writable_kinds();
+std::vector<formats::Kind> writable_kinds();
 
-} // namespace gewebe
+} // namespace gewebe::cli

@@ -16,23 +16,24 @@
 #include <string>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::cli {
 namespace {
 
 /// What was lost of the volume's own surface, and how far the boundary lies from it.
-void compare_surface(cli::Run& run, const PreparedVolume& prepared, const StuffingOptions& options,
-                     const TriangleMesh& surface) {
+void compare_surface(cli::Run& run, const PreparedVolume& prepared,
+                     const stuffing::StuffingOptions& options, const TriangleMesh& surface) {
   const Context& context = run.context();
   const double volume =
-      signed_volume(marching_cubes(context, prepared.grid, prepared.isovalue).mesh);
+      signed_volume(surface::marching_cubes(context, prepared.grid, prepared.isovalue).mesh);
   run.stats().set("volume_isosurface", volume);
-  const SurfaceDistance distance = surface_distance(context, prepared.grid, options, surface);
+  const stuffing::SurfaceDistance distance =
+      stuffing::surface_distance(context, prepared.grid, options, surface);
   run.stats().set("distance_max", distance.largest);
   run.stats().set("distance_mean", distance.mean);
   run.stats().set("beyond_cell", distance.beyond_cell);
 }
 
-void report_stuffing(cli::Stats& stats, const StuffingReport& report, bool follows) {
+void report_stuffing(cli::Stats& stats, const stuffing::StuffingReport& report, bool follows) {
   stats.set("cell", report.cell);
   stats.set("cut_nodes", report.cut_nodes);
   stats.set("warped_nodes", report.warped);
@@ -48,22 +49,23 @@ void report_stuffing(cli::Stats& stats, const StuffingReport& report, bool follo
 } // namespace
 
 void mesh_solid(cli::Run& run, const MeshArguments& arguments) {
-  const Kind kind = output_kind(run.to(), run.output(), Kind::ply, writable_tet_kinds());
-  Output output(run.output(), run.output_options(is_binary(kind)));
-  Input input(arguments.volume);
+  const formats::Kind kind = formats::output_kind(run.to(), run.output(), formats::Kind::ply,
+                                                  formats::writable_tet_kinds());
+  formats::Output output(run.output(), run.output_options(formats::is_binary(kind)));
+  formats::Input input(arguments.volume);
   MaterialVolumes materials(arguments);
   const PreparedVolume prepared = prepare(run, arguments, input);
   run.timed("materials", [&] { materials.read(run, prepared.space); });
-  const StuffingOptions options{prepared.isovalue,
-                                arguments.cell,
-                                static_cast<unsigned>(arguments.grade),
-                                materials.source(prepared.grid, prepared.isovalue),
-                                arguments.interface == "follow",
-                                refined_regions(arguments)};
-  StuffingReport report;
-  TetMesh mesh = at(input.name(), [&] {
-    return run.timed("stuff",
-                     [&] { return stuff(run.context(), prepared.grid, options, &report); });
+  const stuffing::StuffingOptions options{prepared.isovalue,
+                                          arguments.cell,
+                                          static_cast<unsigned>(arguments.grade),
+                                          materials.source(prepared.grid, prepared.isovalue),
+                                          arguments.interface == "follow",
+                                          refined_regions(arguments)};
+  stuffing::StuffingReport report;
+  tetrahedra::TetMesh mesh = at(input.name(), [&] {
+    return run.timed(
+        "stuff", [&] { return stuffing::stuff(run.context(), prepared.grid, options, &report); });
   });
   cli::Stats& stats = run.stats();
   report_stuffing(stats, report, options.follow_interface);
@@ -73,10 +75,11 @@ void mesh_solid(cli::Run& run, const MeshArguments& arguments) {
   warn_if_empty(run, mesh.tetrahedra.empty() && !comparable);
   if (comparable)
     cli::compare_topology(run, "mc-opt", "", arguments.cell ? "--cell" : "--resample",
-                          *prepared.before, topology(boundary(mesh).mesh),
+                          *prepared.before, mesh::topology(tetrahedra::boundary(mesh).mesh),
                           arguments.cell ? "cells" : "voxels");
   if (!arguments.components.empty()) {
-    const TetComponentReport kept = keep_components(mesh, component_choice(arguments.components));
+    const tetrahedra::TetComponentReport kept =
+        tetrahedra::keep_components(mesh, component_choice(arguments.components));
     stats.set("components_dropped", kept.dropped);
     stats.set("tetrahedra_dropped", kept.dropped_tetrahedra);
     stats.set("volume_dropped", kept.dropped_volume);
@@ -85,8 +88,9 @@ void mesh_solid(cli::Run& run, const MeshArguments& arguments) {
   }
   const std::vector<Vec3> as_in_volume = mesh.points;
   bring_to_space(run, prepared.space, arguments, mesh.points);
-  run.timed("write",
-            [&] { write_tet_mesh(output, mesh, kind, run.output_options(is_binary(kind))); });
+  run.timed("write", [&] {
+    formats::write_tet_mesh(output, mesh, kind, run.output_options(formats::is_binary(kind)));
+  });
   output.commit();
   if (run.stats_wanted())
     run.timed("examine", [&] {
@@ -97,4 +101,4 @@ void mesh_solid(cli::Run& run, const MeshArguments& arguments) {
     });
 }
 
-} // namespace gewebe
+} // namespace gewebe::cli

@@ -11,16 +11,17 @@
 
 #include <string>
 
-namespace gewebe {
+namespace gewebe::cli {
 namespace {
 
 /// What the options ask for beyond the snapped mesh.
-void refine(cli::Run& run, const MeshArguments& arguments, const Grid& grid, double isovalue,
-            TriangleMesh& mesh) {
+void refine(cli::Run& run, const MeshArguments& arguments, const volume::Grid& grid,
+            double isovalue, TriangleMesh& mesh) {
   const Context& context = run.context();
   cli::Stats& stats = run.stats();
   if (!arguments.components.empty()) {
-    const ComponentReport report = keep_components(mesh, component_choice(arguments.components));
+    const mesh::ComponentReport report =
+        mesh::keep_components(mesh, component_choice(arguments.components));
     warn_of_components(run, report.kept, report.dropped);
     stats.set("components_dropped", report.dropped);
     stats.set("points_dropped", report.dropped_points);
@@ -31,8 +32,9 @@ void refine(cli::Run& run, const MeshArguments& arguments, const Grid& grid, dou
     stats.set("triangles", mesh.triangles.size());
   }
   if (arguments.rounds > 0) {
-    const RegularizeReport report = run.timed("regularize", [&] {
-      return regularize(context, grid, isovalue, mesh, {static_cast<int>(arguments.rounds)});
+    const surface::RegularizeReport report = run.timed("regularize", [&] {
+      return surface::regularize(context, grid, isovalue, mesh,
+                                 {static_cast<int>(arguments.rounds)});
     });
     stats.set("edges_flipped", report.flips);
     stats.set("moves", report.moves);
@@ -41,28 +43,30 @@ void refine(cli::Run& run, const MeshArguments& arguments, const Grid& grid, dou
   }
   if (arguments.normals)
     stats.set("normals_of_faces", run.timed("normals", [&] {
-      return gradient_normals(context, grid, mesh).from_faces;
+      return surface::gradient_normals(context, grid, mesh).from_faces;
     }));
 }
 
 } // namespace
 
 void mesh_surface(cli::Run& run, const MeshArguments& arguments) {
-  const Kind kind = output_kind(run.to(), run.output(), Kind::ply, writable_mesh_kinds());
-  Output output(run.output(), run.output_options(is_binary(kind)));
-  Input input(arguments.volume);
+  const formats::Kind kind = formats::output_kind(run.to(), run.output(), formats::Kind::ply,
+                                                  formats::writable_mesh_kinds());
+  formats::Output output(run.output(), run.output_options(formats::is_binary(kind)));
+  formats::Input input(arguments.volume);
   const Context& context = run.context();
   const PreparedVolume prepared = prepare(run, arguments, input);
-  const IsoSurface surface = at(input.name(), [&] {
+  const surface::IsoSurface surface = at(input.name(), [&] {
     return run.timed("marching_cubes", [&] {
-      return marching_cubes_to_snap(context, prepared.grid, arguments.isovalue);
+      return surface::marching_cubes_to_snap(context, prepared.grid, arguments.isovalue);
     });
   });
-  SnapOptions options;
+  surface::SnapOptions options;
   options.epsilon = arguments.epsilon.value_or(options.epsilon);
-  options.place =
-      arguments.place == "corner" ? SnapOptions::Place::corner : SnapOptions::Place::mean;
-  SnapResult snapped = run.timed("snap", [&] { return snap(context, surface, options); });
+  options.place = arguments.place == "corner" ? surface::SnapOptions::Place::corner
+                                              : surface::SnapOptions::Place::mean;
+  surface::SnapResult snapped =
+      run.timed("snap", [&] { return surface::snap(context, surface, options); });
   cli::report_meshing(run.stats(), prepared.grid, surface, snapped.report);
   run.say(std::to_string(snapped.report.points_before) + " points, " +
           std::to_string(snapped.report.points_after) + " after snapping");
@@ -74,14 +78,14 @@ void mesh_surface(cli::Run& run, const MeshArguments& arguments) {
             " triangles cut or touch each other, as where values equal the isovalue");
   warn_if_empty(run, snapped.mesh.triangles.empty());
   if (!snapped.mesh.triangles.empty() && prepared.before)
-    cli::compare_topology(run, "mc-opt", "", "--resample", *prepared.before, topology(snapped.mesh),
-                          "voxels");
+    cli::compare_topology(run, "mc-opt", "", "--resample", *prepared.before,
+                          mesh::topology(snapped.mesh), "voxels");
   refine(run, arguments, prepared.grid, prepared.isovalue, snapped.mesh);
   bring_to_space(run, prepared.space, arguments, snapped.mesh.points, &snapped.mesh.normals);
-  run.timed("write", [&] { write_mesh(output, snapped.mesh, kind); });
+  run.timed("write", [&] { formats::write_mesh(output, snapped.mesh, kind); });
   output.commit();
   if (run.stats_wanted())
     run.timed("examine", [&] { report_surface(run, snapped.mesh, arguments.self_intersections); });
 }
 
-} // namespace gewebe
+} // namespace gewebe::cli

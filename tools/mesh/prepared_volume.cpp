@@ -11,16 +11,17 @@
 #include <optional>
 #include <string>
 
-namespace gewebe {
+namespace gewebe::cli {
 namespace {
 
 /// Topology of the requested surface on the volume as read.
-Topology topology_of(const Context& context, const Grid& grid, const MeshArguments& arguments) {
+mesh::Topology topology_of(const Context& context, const volume::Grid& grid,
+                           const MeshArguments& arguments) {
   if (arguments.box.empty())
-    return topology(marching_cubes(context, grid, arguments.isovalue).mesh);
-  const double isovalue = arguments.isovalue.value_or(default_isovalue(grid.info()));
-  const Grid part = crop(context, grid, box_of(arguments.box), isovalue);
-  return topology(marching_cubes(context, part, arguments.isovalue).mesh);
+    return mesh::topology(surface::marching_cubes(context, grid, arguments.isovalue).mesh);
+  const double isovalue = arguments.isovalue.value_or(surface::default_isovalue(grid.info()));
+  const volume::Grid part = volume::crop(context, grid, box_of(arguments.box), isovalue);
+  return mesh::topology(surface::marching_cubes(context, part, arguments.isovalue).mesh);
 }
 
 } // namespace
@@ -46,16 +47,17 @@ void warn_of_components(cli::Run& run, std::uint64_t kept, std::uint64_t dropped
     run.warn("no component is as large as --components requires");
 }
 
-PreparedVolume prepare(cli::Run& run, const MeshArguments& arguments, Input& input) {
+PreparedVolume prepare(cli::Run& run, const MeshArguments& arguments, formats::Input& input) {
   const Context& context = run.context();
   PreparedVolume result;
-  result.grid = run.timed("read", [&] { return read_volume(input, context, &result.space); });
-  result.isovalue = arguments.isovalue.value_or(default_isovalue(result.grid.info()));
+  result.grid =
+      run.timed("read", [&] { return formats::read_volume(input, context, &result.space); });
+  result.isovalue = arguments.isovalue.value_or(surface::default_isovalue(result.grid.info()));
   at(input.name(), [&] {
-    std::optional<Grid> resampled; // first, since what it needs is refused before long work
+    std::optional<volume::Grid> resampled; // first, since what it needs is refused before long work
     if (arguments.voxel)
       resampled = run.timed("resample", [&] {
-        return resample(context, result.grid, uniform_transform(*arguments.voxel));
+        return volume::resample(context, result.grid, volume::uniform_transform(*arguments.voxel));
       });
     if (arguments.voxel || arguments.cell)
       result.before =
@@ -64,7 +66,7 @@ PreparedVolume prepare(cli::Run& run, const MeshArguments& arguments, Input& inp
       result.grid = *std::move(resampled);
     if (!arguments.box.empty())
       result.grid = run.timed("crop", [&] {
-        return crop(context, result.grid, box_of(arguments.box), result.isovalue);
+        return volume::crop(context, result.grid, box_of(arguments.box), result.isovalue);
       });
   });
   return result;
@@ -76,4 +78,4 @@ void warn_if_empty(cli::Run& run, bool empty) {
                   "the surface is empty: no value lies across the isovalue from another");
 }
 
-} // namespace gewebe
+} // namespace gewebe::cli

@@ -12,17 +12,17 @@
 #include <optional>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::cli {
 
 /// The volume as it is meshed, and the topology of its surface as it came where that may change.
 struct PreparedVolume {
-  Grid grid;
+  volume::Grid grid;
   double isovalue = 0;
-  std::optional<Topology> before;
+  std::optional<mesh::Topology> before;
   Space space = Space::unknown; ///< of the grid, as stated in it
 };
 
-PreparedVolume prepare(cli::Run& run, const MeshArguments& arguments, Input& input);
+PreparedVolume prepare(cli::Run& run, const MeshArguments& arguments, formats::Input& input);
 
 /// Converts the mesh to the space of --space, and reports the space.
 void bring_to_space(cli::Run& run, Space from, const MeshArguments& arguments,
@@ -32,4 +32,4 @@ void bring_to_space(cli::Run& run, Space from, const MeshArguments& arguments,
 void warn_if_empty(cli::Run& run, bool empty);
 void warn_of_components(cli::Run& run, std::uint64_t kept, std::uint64_t dropped);
 
-} // namespace gewebe
+} // namespace gewebe::cli

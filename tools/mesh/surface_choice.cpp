@@ -6,10 +6,10 @@
 #include <cmath>
 #include <string_view>
 
-namespace gewebe {
+namespace gewebe::cli {
 
-ComponentChoice component_choice(const std::string& text) {
-  ComponentChoice choice;
+mesh::ComponentChoice component_choice(const std::string& text) {
+  mesh::ComponentChoice choice;
   if (text.empty())
     return choice;
   if (text == "largest") {
@@ -41,4 +41,4 @@ Box3 box_of(const std::vector<double>& numbers) {
   return box;
 }
 
-} // namespace gewebe
+} // namespace gewebe::cli

@@ -7,12 +7,12 @@
 #include <string>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::cli {
 
 /// "largest", a number of components, or "min-volume:V"; all if empty. \throw UsageError
-ComponentChoice component_choice(const std::string& text);
+mesh::ComponentChoice component_choice(const std::string& text);
 
 /// Of X0, Y0, Z0, X1, Y1, Z1; empty without numbers. \throw UsageError if it has no volume
 Box3 box_of(const std::vector<double>& numbers);
 
-} // namespace gewebe
+} // namespace gewebe::cli

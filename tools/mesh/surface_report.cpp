@@ -12,7 +12,7 @@ double reduction(std::uint64_t before, std::uint64_t after) {
   return before == 0 ? 0 : 1 - static_cast<double>(after) / static_cast<double>(before);
 }
 
-void set(Stats& stats, const char* key, const Histogram& histogram) {
+void set(Stats& stats, const char* key, const mesh::Histogram& histogram) {
   Stats& object = stats.object(key);
   object.set("top", histogram.top);
   object.set("counts", histogram.counts);
@@ -20,8 +20,8 @@ void set(Stats& stats, const char* key, const Histogram& histogram) {
 
 } // namespace
 
-void report_meshing(Stats& stats, const Grid& grid, const IsoSurface& surface,
-                    const SnapReport& snapped) {
+void report_meshing(Stats& stats, const volume::Grid& grid, const surface::IsoSurface& surface,
+                    const surface::SnapReport& snapped) {
   stats.set("voxels", grid.active_voxels());
   stats.set("leaves", surface.leaves);
   stats.set("leaves_visited", surface.leaves_visited);
@@ -40,8 +40,8 @@ void report_meshing(Stats& stats, const Grid& grid, const IsoSurface& surface,
 
 void report_surface(Run& run, const TriangleMesh& mesh, bool self_intersections) {
   Stats& stats = run.stats();
-  MeshQuality quality;
-  const MeshReport report = examine_mesh(mesh, run.context(), &quality);
+  mesh::MeshQuality quality;
+  const mesh::MeshReport report = mesh::examine_mesh(mesh, run.context(), &quality);
   stats.set("closed", report.closed());
   stats.set("manifold", report.manifold());
   stats.set("oriented", report.oriented());
@@ -64,7 +64,7 @@ void report_surface(Run& run, const TriangleMesh& mesh, bool self_intersections)
   set(stats, "edge_lengths", quality.edge_lengths);
   set(stats, "areas", quality.areas);
   if (self_intersections) {
-    const SelfIntersections found = gewebe::self_intersections(run.context(), mesh);
+    const mesh::SelfIntersections found = gewebe::mesh::self_intersections(run.context(), mesh);
     stats.set("self_intersections", found.pairs);
     stats.set("self_intersecting_faces", std::uint64_t{found.faces.size()});
   }

@@ -10,8 +10,8 @@
 namespace gewebe::cli {
 
 /// What was visited and merged.
-void report_meshing(Stats& stats, const Grid& grid, const IsoSurface& surface,
-                    const SnapReport& snapped);
+void report_meshing(Stats& stats, const volume::Grid& grid, const surface::IsoSurface& surface,
+                    const surface::SnapReport& snapped);
 
 /// Topology, size, shape and digest of a mesh, into the stats of the run.
 void report_surface(Run& run, const TriangleMesh& mesh, bool self_intersections);

@@ -11,11 +11,11 @@
 
 namespace gewebe::cli {
 
-TriangleMesh report_tetrahedra(Run& run, const TetMesh& mesh) {
+TriangleMesh report_tetrahedra(Run& run, const tetrahedra::TetMesh& mesh) {
   Stats& stats = run.stats();
-  TetBoundary surface = boundary(mesh);
-  const TetReport found = examine_tetrahedra(mesh);
-  const TetQuality quality = tet_quality(mesh, surface);
+  tetrahedra::TetBoundary surface = tetrahedra::boundary(mesh);
+  const tetrahedra::TetReport found = tetrahedra::examine_tetrahedra(mesh);
+  const tetrahedra::TetQuality quality = tetrahedra::tet_quality(mesh, surface);
   stats.set("points", mesh.points.size());
   stats.set("tetrahedra", mesh.tetrahedra.size());
   stats.set("surface_nodes", quality.surface_nodes);
@@ -23,9 +23,9 @@ TriangleMesh report_tetrahedra(Run& run, const TetMesh& mesh) {
   stats.set("surface_triangles", surface.mesh.triangles.size());
   stats.set("sound", found.sound());
   stats.set("manifold", found.manifold_boundary());
-  stats.set("components", component_count(mesh));
+  stats.set("components", tetrahedra::component_count(mesh));
   if (found.manifold_boundary())
-    stats.set("euler", topology(surface.mesh).euler);
+    stats.set("euler", mesh::topology(surface.mesh).euler);
   stats.set("volume", quality.volume);
   stats.set("smallest_volume", quality.smallest_volume);
   stats.set("area", surface_area(surface.mesh));
@@ -38,7 +38,7 @@ TriangleMesh report_tetrahedra(Run& run, const TetMesh& mesh) {
   angles.set("top", quality.angles.top);
   angles.set("counts", quality.angles.counts);
   Stats& materials = stats.object("materials");
-  for (const MaterialShare& share : quality.materials) {
+  for (const tetrahedra::MaterialShare& share : quality.materials) {
     Stats& material = materials.object(std::to_string(share.material));
     material.set("tetrahedra", share.tetrahedra);
     material.set("volume", share.volume);

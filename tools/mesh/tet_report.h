@@ -9,6 +9,6 @@ namespace gewebe::cli {
 
 /// Topology, size, shape, materials and digest of a mesh, into the stats of the run.
 /// \return the boundary
-TriangleMesh report_tetrahedra(Run& run, const TetMesh& mesh);
+TriangleMesh report_tetrahedra(Run& run, const tetrahedra::TetMesh& mesh);
 
 } // namespace gewebe::cli

@@ -6,7 +6,7 @@
 
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::cli {
 
 namespace {
 
@@ -15,8 +15,8 @@ template <class Work>
 auto parsed(const char* option, Work&& parse) {
   try {
     return parse();
-  } catch (const Error& error) {
-    throw UsageError(std::string(option) + ": " + error.what());
+  } catch (const gewebe::Error& error) {
+    throw gewebe::UsageError(std::string(option) + ": " + error.what());
   }
 }
 
@@ -27,23 +27,23 @@ void refuse(bool wrong, const char* what) {
 
 std::vector<std::string> preset_names() {
   std::vector<std::string> names;
-  for (const Material& material : material_presets())
+  for (const model::Material& material : model::material_presets())
     names.push_back(material.name);
   return names;
 }
 
 /// The text of a table that parses.
 std::string checked_table(const std::string& file) {
-  Input input(file, false);
+  formats::Input input(file, false);
   std::string text = input.read_all();
-  (void)parse_material_table(text, input.name());
+  (void)model::parse_material_table(text, input.name());
   return text;
 }
 
 } // namespace
 
 void declare(cli::Program& p, ModelArguments& a) {
-  BuildOptions& b = a.build;
+  model::BuildOptions& b = a.build;
   p.option("--fix", a.fix, "SELECTOR", "nodes that cannot move, or none");
   p.option("--fix-axes", a.axes, "AXES", "axes along which --fix holds nodes")
       .one_of({"x", "y", "z", "xy", "xz", "yz", "xyz"});
@@ -104,9 +104,10 @@ void declare(cli::Program& p, ModelArguments& a) {
       .such_as({"plane:", "tube:", "sphere:"});
   p.option("--size", a.size, "A,B", "size of the primitive in mm");
   p.option("--name", a.name, "NAME", "name of the model; default: that of its first material");
-  p.option("--unit", a.unit, "UNIT", "unit of the mesh: m, cm, mm").one_of(mesh_unit_names());
+  p.option("--unit", a.unit, "UNIT", "unit of the mesh: m, cm, mm")
+      .one_of(formats::mesh_unit_names());
   p.option("--weld", a.weld, "MODE", "points at one place to merge: auto, all, part, none")
-      .one_of(weld_names());
+      .one_of(formats::weld_names());
   p.option("--repair", a.repair, "LIST",
            "repairs: weld[:MM], duplicates, orientation, degenerate, holes[:EDGES], all")
       .such_as({"weld", "duplicates", "orientation", "degenerate", "holes", "all"});
@@ -115,15 +116,15 @@ void declare(cli::Program& p, ModelArguments& a) {
 void complete(ModelArguments& a) {
   refuse(a.build.stiffness && a.values.young, "--stiffness and --young, expected one of them");
   refuse(a.build.mass && a.values.density, "--mass and --density, expected one of them");
-  refuse(!a.build.bend && a.build.bend_factor != BuildOptions{}.bend_factor,
+  refuse(!a.build.bend && a.build.bend_factor != model::BuildOptions{}.bend_factor,
          "--bend-stiffness without --bend, expected both");
   refuse(a.fix == "none" && a.axes != ModelArguments{}.axes,
          "--fix-axes without --fix, expected both");
   refuse(a.cell && !a.solid, "--cell without --solid, expected both");
   refuse(!a.refine.empty() && !a.solid, "--refine without --solid, expected both");
   if (!a.refine.empty())
-    a.refined = parsed("--refine", [&] { return parse_refinement(a.refine); });
-  for (const RefinedRegion& region : a.refined)
+    a.refined = parsed("--refine", [&] { return tetrahedra::parse_refinement(a.refine); });
+  for (const tetrahedra::RefinedRegion& region : a.refined)
     refuse(!region.materials.empty(),
            "--refine: label is for mc-opt --tets, expected sphere, box or surface");
   refuse(!a.solid && a.rule != ModelArguments{}.rule, "--rule without --solid, expected both");
@@ -132,19 +133,19 @@ void complete(ModelArguments& a) {
   refuse(a.no_skin && !a.solid, "--no-skin without --solid, expected both");
   refuse(a.scale_mass && !a.dt, "--scale-mass without --dt, expected both");
   refuse(a.primitive.empty() && !a.size.empty(), "--size without --primitive, expected both");
-  a.repairs = parsed("--repair", [&] { return parse_repair(a.repair); });
+  a.repairs = parsed("--repair", [&] { return repair::parse_repair(a.repair); });
   if (!a.primitive.empty()) {
     refuse(a.mesh != "-" || !a.unit.empty() || a.weld != "auto" || !a.repair.empty(),
            "--primitive makes the mesh, expected no other and no option that reads one");
-    a.matrix = parsed("--primitive", [&] { return parse_primitive(a.primitive, a.size); });
+    a.matrix = parsed("--primitive", [&] { return model::parse_primitive(a.primitive, a.size); });
   }
-  parsed("--name", [&] { check_name(a.name); });
+  parsed("--name", [&] { model::check_name(a.name); });
   if (!a.law.empty())
-    a.values.law = parsed("--law", [&] { return parse_law(a.law); });
+    a.values.law = parsed("--law", [&] { return model::parse_law(a.law); });
   if (a.prony == "none")
     a.values.prony.emplace();
   else if (!a.prony.empty())
-    a.values.prony = parsed("--prony", [&] { return parse_prony("prony:" + a.prony); });
+    a.values.prony = parsed("--prony", [&] { return model::parse_prony("prony:" + a.prony); });
   refuse(a.list_materials && (a.mesh != "-" || a.matrix || a.fix != "none" || !a.fit.empty()),
          "--list-materials makes no model, expected no mesh and no nodes");
   if (a.materials.empty())
@@ -157,27 +158,29 @@ void complete(ModelArguments& a) {
   if (!a.matrix && !a.list_materials)
     inputs.push_back(a.mesh);
   if (a.fix != "none") {
-    a.fixed = parsed("--fix", [&] { return parse_selector(a.fix); });
-    for (const std::string& name : node_list_names(*a.fixed))
+    a.fixed = parsed("--fix", [&] { return model::parse_selector(a.fix); });
+    for (const std::string& name : model::node_list_names(*a.fixed))
       inputs.push_back(name);
   }
   cli::check_one_pipe(inputs);
 }
 
 void choose_materials(ModelArguments& a) {
-  std::string table(preset_table());
+  std::string table(model::preset_table());
   if (!a.materials.empty())
-    table = merged_tables(table, checked_table(a.materials));
-  const std::vector<Material> known = parse_material_table(table, a.materials);
-  a.build.material = parsed("--material", [&] { return parse_material_choice(a.material, known); });
-  override_materials(a.build.material.materials, a.values);
+    table = model::merged_tables(table, checked_table(a.materials));
+  const std::vector<model::Material> known = model::parse_material_table(table, a.materials);
+  a.build.material =
+      parsed("--material", [&] { return model::parse_material_choice(a.material, known); });
+  model::override_materials(a.build.material.materials, a.values);
 }
 
 void list_materials(cli::Run& run, const ModelArguments& a) {
-  Output output(run.output(), run.output_options(false));
-  output.write(a.materials.empty() ? std::string(preset_table())
-                                   : merged_tables(preset_table(), checked_table(a.materials)));
+  formats::Output output(run.output(), run.output_options(false));
+  output.write(a.materials.empty()
+                   ? std::string(model::preset_table())
+                   : model::merged_tables(model::preset_table(), checked_table(a.materials)));
   output.commit();
 }
 
-} // namespace gewebe
+} // namespace gewebe::cli

@@ -14,21 +14,21 @@
 #include <string>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::cli {
 
 struct ModelArguments {
   std::string mesh = "-", unit, weld = "auto", material = "generic", name, fix = "none",
               axes = "xyz", primitive, size, repair, materials, fit, rule = "parity",
               on_open = "error", space, transform, law, prony, refine;
-  MaterialOverrides values;
-  BuildOptions build;
-  RepairOptions repairs;
-  std::optional<Selector> fixed;
-  std::optional<Primitive> matrix;
+  model::MaterialOverrides values;
+  model::BuildOptions build;
+  repair::RepairOptions repairs;
+  std::optional<model::Selector> fixed;
+  std::optional<model::Primitive> matrix;
   std::optional<double> dt;
   std::int64_t order = 2;     ///< of finite elements
   std::optional<double> cell; ///< of the lattice that fills a surface
-  std::vector<RefinedRegion> refined;
+  std::vector<tetrahedra::RefinedRegion> refined;
   bool solid = false, no_skin = false, scale_mass = false, list_materials = false;
 };
 
@@ -45,4 +45,4 @@ void choose_materials(ModelArguments& a);
 /// Writes the table of the materials there are.
 void list_materials(cli::Run& run, const ModelArguments& a);
 
-} // namespace gewebe
+} // namespace gewebe::cli

@@ -21,19 +21,20 @@ namespace {
 /// Four digits, for people.
 std::string figure(double value) {
   if (!(value > 0 && std::isfinite(value)))
-    return number_text(value);
+    return text::number_text(value);
   const double unit = std::pow(10, std::floor(std::log10(value)) - 3);
-  return number_text(unit < 1 ? std::round(value / unit) / std::round(1 / unit)
-                              : std::round(value / unit) * unit);
+  return text::number_text(unit < 1 ? std::round(value / unit) / std::round(1 / unit)
+                                    : std::round(value / unit) * unit);
 }
 
-SolidVector load_of(const Model& model, const TetMesh& mesh,
-                    const std::vector<SolidMaterial>& materials,
-                    const std::vector<SolidElement>& elements, const LoadCase& c) {
-  SolidVector load = hyperelastic_weight(mesh, materials, elements, c.gravity);
-  const auto lists = [](const std::string& name) { return Input(name, false).read_all(); };
-  for (const MeasuredForce& f : c.forces) {
-    const auto nodes = select_nodes(model, f.nodes, lists, SelectorScope::body);
+fit::SolidVector load_of(const model::Model& model, const tetrahedra::TetMesh& mesh,
+                         const std::vector<fem::SolidMaterial>& materials,
+                         const std::vector<fem::SolidElement>& elements,
+                         const formats::LoadCase& c) {
+  fit::SolidVector load = fit::hyperelastic_weight(mesh, materials, elements, c.gravity);
+  const auto lists = [](const std::string& name) { return formats::Input(name, false).read_all(); };
+  for (const formats::MeasuredForce& f : c.forces) {
+    const auto nodes = model::select_nodes(model, f.nodes, lists, model::SelectorScope::body);
     const Vec3 each = f.total ? f.force / static_cast<double>(nodes.size()) : f.force;
     for (const auto node : nodes)
       for (int axis = 0; axis < 3; ++axis)
@@ -43,7 +44,7 @@ SolidVector load_of(const Model& model, const TetMesh& mesh,
 }
 
 /// Axes that are held, and those of nodes that no tetrahedron has.
-std::vector<std::uint8_t> held_axes(const Model& model) {
+std::vector<std::uint8_t> held_axes(const model::Model& model) {
   std::vector<std::uint8_t> fixed(3 * model.nodes.size(), 1);
   const auto set = [&](std::uint32_t node) {
     for (std::size_t axis = 0; axis < 3; ++axis)
@@ -56,12 +57,13 @@ std::vector<std::uint8_t> held_axes(const Model& model) {
   return fixed;
 }
 
-std::vector<std::size_t> wanted_of(const Model& model, const Measurements& measured) {
+std::vector<std::size_t> wanted_of(const model::Model& model,
+                                   const formats::Measurements& measured) {
   std::vector<std::uint8_t> sought(model.materials.size());
   for (const std::int32_t m : model.tetrahedron_material)
     sought[static_cast<std::size_t>(m)] = 1;
   for (const std::string& name : measured.known) {
-    const auto found = std::ranges::find(model.materials, name, &Material::name);
+    const auto found = std::ranges::find(model.materials, name, &model::Material::name);
     if (found == model.materials.end())
       throw Error("known '" + name + "' is no material of the model");
     sought[static_cast<std::size_t>(found - model.materials.begin())] = 0;
@@ -73,20 +75,22 @@ std::vector<std::size_t> wanted_of(const Model& model, const Measurements& measu
   return wanted;
 }
 
-void fit_moduli(Run& run, Model& model, const Measurements& measured, Stats& stats) {
-  const TetMesh mesh = element_mesh(model);
-  const std::vector<SolidMaterial> materials = element_materials(model);
-  const std::vector<SolidElement> elements = solid_elements(mesh, materials, run.context());
+void fit_moduli(Run& run, model::Model& model, const formats::Measurements& measured,
+                Stats& stats) {
+  const tetrahedra::TetMesh mesh = fem::element_mesh(model);
+  const std::vector<fem::SolidMaterial> materials = fem::element_materials(model);
+  const std::vector<fem::SolidElement> elements =
+      fem::solid_elements(mesh, materials, run.context());
   const std::vector<std::size_t> wanted = wanted_of(model, measured);
   std::vector<std::string> names;
-  for (const Material& m : model.materials)
+  for (const model::Material& m : model.materials)
     names.push_back(m.name);
-  std::vector<MeasuredCase> cases;
-  for (const LoadCase& c : measured.cases)
+  std::vector<fit::MeasuredCase> cases;
+  for (const formats::LoadCase& c : measured.cases)
     cases.push_back({load_of(model, mesh, materials, elements, c), c.measurements});
-  const YoungFit fit =
-      fit_young(mesh, materials, names, wanted, held_axes(model), cases, {}, run.context());
-  for (const FittedYoung& young : fit.materials) {
+  const fit::YoungFit fit =
+      fit::fit_young(mesh, materials, names, wanted, held_axes(model), cases, {}, run.context());
+  for (const fit::FittedYoung& young : fit.materials) {
     const std::string& name = names[young.material];
     std::string text = name + ": Young's modulus " + figure(young.young) + " Pa";
     Stats& own = stats.object("young").object(name);
@@ -109,8 +113,8 @@ void fit_moduli(Run& run, Model& model, const Measurements& measured, Stats& sta
     run.warn(name + ": is off by more than chance, expected a measurement like the others");
 }
 
-void fit_damping(Run& run, const Measurements& measured, Stats& stats) {
-  const SwingFit swing = fit_swing(measured.times, measured.values);
+void fit_damping(Run& run, const formats::Measurements& measured, Stats& stats) {
+  const fit::SwingFit swing = fit::fit_swing(measured.times, measured.values);
   const std::string damping = figure(swing.ratio) + "@" + figure(swing.frequency);
   Stats& own = stats.object("swing");
   own.set("frequency", swing.frequency);
@@ -127,14 +131,15 @@ void fit_damping(Run& run, const Measurements& measured, Stats& stats) {
 
 } // namespace
 
-void fit_model(Run& run, Model& model, const std::string& file) {
+void fit_model(Run& run, model::Model& model, const std::string& file) {
   if (model.tetrahedra.empty() || !model.springs.empty())
     throw Error("--fit: the model has springs, expected one of tetrahedra alone");
-  if (is_viscoelastic(model))
+  if (dynamics::is_viscoelastic(model))
     throw Error("--fit: the model is viscoelastic, and measurements have no time, expected --prony "
                 "none");
-  Input input(file, false);
-  const Measurements measured = parse_measurements(input.read_all(), input.name());
+  formats::Input input(file, false);
+  const formats::Measurements measured =
+      formats::parse_measurements(input.read_all(), input.name());
   at(input.name(), [&] {
     Stats& stats = run.stats().object("fit");
     run.timed("fit", [&] {

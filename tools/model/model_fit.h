@@ -12,6 +12,6 @@ namespace gewebe::cli {
 /// fit, and reports them with their intervals; of a swing its frequency and damping, which
 /// the model has no place for. \throw Error if the model isn't one of tetrahedra alone, if a
 /// material isn't there, as fit_young and fit_swing
-void fit_model(Run& run, Model& model, const std::string& file);
+void fit_model(Run& run, model::Model& model, const std::string& file);
 
 } // namespace gewebe::cli

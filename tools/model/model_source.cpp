@@ -27,7 +27,7 @@ void refuse(bool wrong, const char* what) {
 
 } // namespace
 
-Model model_source(Run& run, ModelArguments a, Space& space) {
+model::Model model_source(Run& run, ModelArguments a, Space& space) {
   const std::optional<Affine> map =
       a.transform.empty() ? std::nullopt : std::optional(transform_from_text(a.transform));
   space = space_from_name(a.space);
@@ -35,27 +35,29 @@ Model model_source(Run& run, ModelArguments a, Space& space) {
       "the input is a surface, expected --solid beside --poisson, --law, --prony and --order";
   if (a.matrix) {
     refuse(!a.solid && (a.values.law || a.values.prony), for_solids);
-    number_parts(a.build.material, {});
-    require_parts(a.build.material, {});
+    model::number_parts(a.build.material, {});
+    model::require_parts(a.build.material, {});
     const double nodes = static_cast<double>(a.matrix->m) * a.matrix->n;
     require_memory(run.context(),
                    nodes * static_cast<double>(sizeof(Vec3) + 2 * sizeof(Triangle)) +
-                       (a.solid ? 0 : model_bytes(nodes, 2 * nodes, a.build.bend)),
+                       (a.solid ? 0 : model::model_bytes(nodes, 2 * nodes, a.build.bend)),
                    "the primitive");
-    TriangleMesh mesh = primitive_mesh(*a.matrix);
+    TriangleMesh mesh = model::primitive_mesh(*a.matrix);
     if (map)
       apply(*map, mesh);
     return model_of_surface(run, a.primitive, std::move(mesh), a);
   }
-  Input input(a.mesh);
-  const Kind from = input_kind(input.peek(4096), a.mesh, run.format());
+  formats::Input input(a.mesh);
+  const formats::Kind from = formats::input_kind(input.peek(4096), a.mesh, run.format());
   // No given option may be ignored.
-  refuse(from == Kind::ela && (!a.unit.empty() || a.weld != "auto" || !a.repair.empty() ||
-                               a.order != 2 || a.solid || a.build != BuildOptions{}),
+  refuse(from == formats::Kind::ela &&
+             (!a.unit.empty() || a.weld != "auto" || !a.repair.empty() || a.order != 2 || a.solid ||
+              a.build != model::BuildOptions{}),
          "the input is a model, expected a mesh for options that build one");
-  if (from == Kind::ela) {
+  if (from == formats::Kind::ela) {
     Space stated = Space::unknown;
-    Model model = run.timed("read", [&] { return read_ela(input, run.context(), &stated); });
+    model::Model model =
+        run.timed("read", [&] { return formats::read_ela(input, run.context(), &stated); });
     space = result_space(stated, a.space);
     Affine whole;
     if (spaces_differ(stated, space))
@@ -66,35 +68,35 @@ Model model_source(Run& run, ModelArguments a, Space& space) {
       at(input.name(), [&] { apply(whole, model); });
     return model;
   }
-  const bool tetrahedra = holds_tetrahedra(input.peek(4096), from);
+  const bool tetrahedra = formats::holds_tetrahedra(input.peek(4096), from);
   refuse(a.solid && tetrahedra, "--solid: the input holds tetrahedra already, expected a surface");
   if (tetrahedra) {
-    at(input.name(), [&] { number_parts(a.build.material, {}); });
+    at(input.name(), [&] { model::number_parts(a.build.material, {}); });
     return solid_source(run, input, from, a);
   }
   refuse(!a.solid && (a.values.poisson || a.values.law || a.values.prony || a.order != 2),
          for_solids);
-  const MeshReadOptions options{.kind = from,
-                                .unit = a.unit,
-                                .weld = weld_from_name(a.weld),
-                                .max_memory = run.context().max_memory};
-  MeshReadStats read;
-  TriangleMesh mesh = run.timed("read", [&] { return read_mesh(input, options, &read); });
+  const formats::MeshReadOptions options{.kind = from,
+                                         .unit = a.unit,
+                                         .weld = formats::weld_from_name(a.weld),
+                                         .max_memory = run.context().max_memory};
+  formats::MeshReadStats read;
+  TriangleMesh mesh = run.timed("read", [&] { return formats::read_mesh(input, options, &read); });
   if (map)
     at(input.name(), [&] { apply(*map, mesh); });
   at(input.name(), [&] {
-    number_parts(a.build.material, read.part_names);
-    require_parts(a.build.material, mesh.part);
+    model::number_parts(a.build.material, read.part_names);
+    model::require_parts(a.build.material, mesh.part);
   });
   if (a.unit.empty())
     warn_of_size(run, input.name(), mesh, {});
   return model_of_surface(run, input.name(), std::move(mesh), a);
 }
 
-void warn_of_laws(Run& run, const Model& model) {
-  for (const Material& m : model.materials)
-    if (const std::string paths = m.law ? instability_text(*m.law) : ""; !paths.empty())
-      run.warn(model.name + ": material '" + m.name + "': " + law_text(*m.law) +
+void warn_of_laws(Run& run, const model::Model& model) {
+  for (const model::Material& m : model.materials)
+    if (const std::string paths = m.law ? model::instability_text(*m.law) : ""; !paths.empty())
+      run.warn(model.name + ": material '" + m.name + "': " + model::law_text(*m.law) +
                " is unstable in " + paths + ", expected smaller strains or other parameters");
 }
 

@@ -11,9 +11,9 @@ namespace gewebe::cli {
 /// Makes a primitive, or reads a mesh or tetrahedra and builds a model of them, or reads a model.
 /// \param space  gets the space that the model is in
 /// \throw UsageError if an option says nothing of such an input; Error as the readers
-Model model_source(Run& run, ModelArguments a, Space& space);
+model::Model model_source(Run& run, ModelArguments a, Space& space);
 
 /// Warns of materials whose law becomes unstable under strains, naming the smallest of them.
-void warn_of_laws(Run& run, const Model& model);
+void warn_of_laws(Run& run, const model::Model& model);
 
 } // namespace gewebe::cli

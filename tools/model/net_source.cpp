@@ -13,10 +13,10 @@ namespace gewebe::cli {
 namespace {
 
 void repair(Run& run, const std::string& name, TriangleMesh& mesh, const ModelArguments& a) {
-  const RepairReport report = run.timed("repair", [&] {
-    return at(name, [&] { return repair_mesh(mesh, a.repairs, run.context()); });
+  const repair::RepairReport report = run.timed("repair", [&] {
+    return at(name, [&] { return repair::repair_mesh(mesh, a.repairs, run.context()); });
   });
-  for (const RepairReport::Line& line : report.lines()) {
+  for (const repair::RepairReport::Line& line : report.lines()) {
     run.stats().set(line.key, line.count);
     if (line.count == 0)
       continue;
@@ -27,15 +27,16 @@ void repair(Run& run, const std::string& name, TriangleMesh& mesh, const ModelAr
 
 } // namespace
 
-Model model_of_surface(Run& run, const std::string& name, TriangleMesh mesh,
-                       const ModelArguments& a) {
+model::Model model_of_surface(Run& run, const std::string& name, TriangleMesh mesh,
+                              const ModelArguments& a) {
   if (!a.repair.empty())
     repair(run, name, mesh, a);
   if (a.solid)
     return filled_surface(run, name, mesh, a);
-  BuiltModel built = run.timed(
-      "build", [&] { return at(name, [&] { return build_model(mesh, a.build, run.context()); }); });
-  for (const BuildReport::Line& line : built.report.lines()) {
+  model::BuiltModel built = run.timed("build", [&] {
+    return at(name, [&] { return model::build_model(mesh, a.build, run.context()); });
+  });
+  for (const model::BuildReport::Line& line : built.report.lines()) {
     run.stats().set(line.key, std::uint64_t{line.count});
     if (line.count > 0 && line.warning != nullptr)
       run.warn(name + ": " + std::to_string(line.count) + " " + line.warning);
@@ -44,12 +45,12 @@ Model model_of_surface(Run& run, const std::string& name, TriangleMesh mesh,
 }
 
 /// Few central nodes hold a part of few nodes.
-void warn_of_hinges(Run& run, const Model& model) {
-  const std::vector<Hinged> hinged = hinged_components(model);
+void warn_of_hinges(Run& run, const model::Model& model) {
+  const std::vector<model::Hinged> hinged = model::hinged_components(model);
   run.stats().set("hinged_components", std::uint64_t{hinged.size()});
   if (hinged.empty())
     return;
-  const Hinged& first = hinged.front();
+  const model::Hinged& first = hinged.front();
   run.warn(model.name + ": component " + std::to_string(first.component) + " of " +
            std::to_string(first.nodes) + " nodes" +
            (hinged.size() == 1 ? "" : " and " + std::to_string(hinged.size() - 1) + " more") +

@@ -11,10 +11,10 @@
 namespace gewebe::cli {
 
 /// Repairs the surface by the options, reports that, and makes a net of it, or fills it.
-Model model_of_surface(Run& run, const std::string& name, TriangleMesh mesh,
-                       const ModelArguments& a);
+model::Model model_of_surface(Run& run, const std::string& name, TriangleMesh mesh,
+                              const ModelArguments& a);
 
 /// Few central nodes hold a part of few nodes.
-void warn_of_hinges(Run& run, const Model& model);
+void warn_of_hinges(Run& run, const model::Model& model);
 
 } // namespace gewebe::cli

@@ -15,7 +15,7 @@
 #include <unistd.h>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::cli {
 
 namespace {
 
@@ -36,8 +36,8 @@ std::vector<std::string> names_in(std::string_view list) {
 }
 
 /// Size of the drawing: that of --size, or the default of its kind. \throw UsageError
-std::vector<double> drawing_size(const PlotArguments& in, Kind kind) {
-  const bool ascii = kind == Kind::ascii;
+std::vector<double> drawing_size(const PlotArguments& in, formats::Kind kind) {
+  const bool ascii = kind == formats::Kind::ascii;
   const std::array<std::int64_t, 2> smallest =
       ascii ? std::array<std::int64_t, 2>{40, 10} : std::array<std::int64_t, 2>{200, 150};
   const std::int64_t largest = ascii ? 1000 : 10000;
@@ -55,24 +55,28 @@ std::vector<double> drawing_size(const PlotArguments& in, Kind kind) {
 
 void work(cli::Run& run, const PlotArguments& in) {
   const bool terminal = run.output() == "-" && ::isatty(1) != 0;
-  const Kind kind = output_kind(run.to(), run.output(), terminal ? Kind::ascii : Kind::svg,
-                                {Kind::svg, Kind::ascii});
+  const formats::Kind kind = formats::output_kind(
+      run.to(), run.output(), terminal ? formats::Kind::ascii : formats::Kind::svg,
+      {formats::Kind::svg, formats::Kind::ascii});
   const std::vector<double> size = drawing_size(in, kind);
-  Output output(run.output(), run.output_options(false));
-  Input input(in.table, false);
-  const NumberTable table = read_number_table(input.read_all(), input.name());
+  formats::Output output(run.output(), run.output_options(false));
+  formats::Input input(in.table, false);
+  const formats::NumberTable table = formats::read_number_table(input.read_all(), input.name());
   if (in.y.empty())
-    throw UsageError("--y is required, expected some of " + column_list(table));
-  const NumberColumn& x = in.x.empty() ? table.columns.front() : find_column(table, in.x);
-  std::vector<const NumberColumn*> ys;
+    throw UsageError("--y is required, expected some of " + formats::column_list(table));
+  const formats::NumberColumn& x =
+      in.x.empty() ? table.columns.front() : formats::find_column(table, in.x);
+  std::vector<const formats::NumberColumn*> ys;
   for (const std::string& name : names_in(in.y))
-    ys.push_back(&find_column(table, name));
-  const CurveSheet sheet = at(input.name(), [&] { return curve_sheet(x, ys, in.title); });
+    ys.push_back(&formats::find_column(table, name));
+  const formats::CurveSheet sheet =
+      at(input.name(), [&] { return formats::curve_sheet(x, ys, in.title); });
   run.stats().set("rows", static_cast<std::uint64_t>(x.values.size()));
   run.stats().set("curves", static_cast<std::uint64_t>(ys.size()));
-  output.write(kind == Kind::svg ? curves_svg(sheet, size[0], size[1])
-                                 : curves_ascii(sheet, static_cast<std::size_t>(size[0]),
-                                                static_cast<std::size_t>(size[1])));
+  output.write(kind == formats::Kind::svg
+                   ? formats::curves_svg(sheet, size[0], size[1])
+                   : formats::curves_ascii(sheet, static_cast<std::size_t>(size[0]),
+                                           static_cast<std::size_t>(size[1])));
   output.commit();
 }
 
@@ -87,9 +91,9 @@ int run_plot(int argc, char** argv) {
   p.option("--size", in.size, "W,H",
            "size in pixels, or in letters for ascii; default: 800,500 or 78,24")
       .count(2);
-  p.output_kinds({Kind::svg, Kind::ascii});
+  p.output_kinds({formats::Kind::svg, formats::Kind::ascii});
   p.operand("TABLE", in.table, "CSV with names in its first line, - for standard input");
   return p.run(argc, argv, [&](cli::Run& run) { work(run, in); });
 }
 
-} // namespace gewebe
+} // namespace gewebe::cli

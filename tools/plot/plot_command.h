@@ -1,9 +1,9 @@
 #pragma once
 // gewebe plot: curves of a table, gewebe-plot(1).
 
-namespace gewebe {
+namespace gewebe::cli {
 
 /// \param argv  from the word "plot" on \return exit status
 int run_plot(int argc, char** argv);
 
-} // namespace gewebe
+} // namespace gewebe::cli

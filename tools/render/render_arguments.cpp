@@ -70,11 +70,13 @@ void for_layers(const Layers& layers, const std::string& option, const std::stri
 
 void complete_textures(RenderArguments& a) {
   const Layers layers = layers_of(a);
-  for_layers(layers, "--filter", a.words.filter, [](TextureOptions& o, const std::string& w) {
-    o.filter = texture_filter_from_name(w);
+  for_layers(layers, "--filter", a.words.filter,
+             [](texture::TextureOptions& o, const std::string& w) {
+               o.filter = texture::texture_filter_from_name(w);
+             });
+  for_layers(layers, "--wrap", a.words.wrap, [](texture::TextureOptions& o, const std::string& w) {
+    o.wrap = texture::texture_wrap_from_name(w);
   });
-  for_layers(layers, "--wrap", a.words.wrap,
-             [](TextureOptions& o, const std::string& w) { o.wrap = texture_wrap_from_name(w); });
   if (a.words.sphere != "none")
     for (const std::string& name : words_of(a.words.sphere))
       layer_of(layers, "--sphere", name).options.sphere = true;
@@ -83,8 +85,8 @@ void complete_textures(RenderArguments& a) {
 }
 
 void complete_modes(RenderArguments& a) {
-  a.picture.backend = backend_from_name(a.words.backend);
-  a.picture.gl.mode = gl_mode_from_name(a.words.passes);
+  a.picture.backend = render::backend_from_name(a.words.backend);
+  a.picture.gl.mode = gl::gl_mode_from_name(a.words.passes);
   a.picture.gl.wide = a.words.target == "float";
   a.picture.gl.rgb_scale = static_cast<int>(a.words.rgb_scale);
   a.picture.samples = static_cast<int>(a.words.msaa);
@@ -95,20 +97,21 @@ void complete_modes(RenderArguments& a) {
     a.picture.per_pixel = a.words.tbn == "pixel";
   refuse(a.words.tbn == "vertex" && a.drawing.rest_light,
          "--tbn vertex for --uv triplanar or a solid structure, expected pixel or auto");
-  refuse(a.words.tbn == "pixel" && a.picture.gl.mode != GlMode::shader,
+  refuse(a.words.tbn == "pixel" && a.picture.gl.mode != gl::GlMode::shader,
          "--tbn pixel for fixed functions, expected --passes shader");
   constexpr const char* fixed =
       " for --uv triplanar, a solid texture or --wet, expected shader or cpu (--passes shader, "
       "--backend cpu)";
   const bool shaded = a.drawing.rest || a.drawing.wet;
-  refuse(shaded && a.picture.backend == Backend::gl && a.picture.gl.mode != GlMode::shader &&
-             a.words.compare.empty(),
+  refuse(shaded && a.picture.backend == render::Backend::gl &&
+             a.picture.gl.mode != gl::GlMode::shader && a.words.compare.empty(),
          "--passes " + a.words.passes + fixed);
   if (a.words.compare.empty())
     return;
   a.compare = words_of(a.words.compare);
   for (const std::string& mode : a.compare)
-    refuse(mode != "cpu" && std::ranges::find(gl_mode_names(), mode) == gl_mode_names().end(),
+    refuse(mode != "cpu" &&
+               std::ranges::find(gl::gl_mode_names(), mode) == gl::gl_mode_names().end(),
            "--compare: '" + mode + "' is no mode, expected 3, 2, 1, shader or cpu");
   for (const std::string& mode : a.compare)
     refuse(shaded && mode != "cpu" && mode != "shader", "--compare: " + mode + fixed);
@@ -134,7 +137,7 @@ void complete_clip(RenderArguments& a) {
   const std::vector<double>& w = a.words.clip;
   if (w.empty())
     return;
-  a.reading.clip = ClipPlane{{w[0], w[1], w[2]}, {w[3], w[4], w[5]}};
+  a.reading.clip = tetrahedra::ClipPlane{{w[0], w[1], w[2]}, {w[3], w[4], w[5]}};
   refuse(a.reading.clip->normal == Vec3{}, "--clip: expected another normal than 0");
 }
 
@@ -160,7 +163,7 @@ void complete(RenderArguments& a) {
   refuse(a.offset_texels && has_solid_structure(a),
          "--offset-texels for a solid structure, which has none, expected --offset");
   if (a.words.uv != "auto" && a.words.uv != "triplanar")
-    a.mapping.mapping = uv_mapping_from_name(a.words.uv);
+    a.mapping.mapping = shading::uv_mapping_from_name(a.words.uv);
   refuse(a.light && a.words.light_direction, "--light and --light-direction, expected one of them");
   if (a.words.light_direction) {
     a.light = a.words.light_direction;
@@ -179,7 +182,8 @@ void complete(RenderArguments& a) {
       inputs.push_back(layer->path);
   for (const std::string& path : material_paths(a))
     inputs.push_back(path);
-  if (std::ranges::find(color_ramp_names(), a.volume.ramp) == color_ramp_names().end())
+  if (std::ranges::find(texture::color_ramp_names(), a.volume.ramp) ==
+      texture::color_ramp_names().end())
     inputs.push_back(a.volume.ramp);
   check_one_pipe(inputs);
 }
@@ -199,7 +203,7 @@ void declare_textures(Program& p, RenderArguments& a) {
            "heights to emboss: brightness of an image, noise or veins")
       .numbered(path_of(&RenderMaterial::structure));
   p.option("--by", a.words.by, "WORD", "what N counts: material, part, object")
-      .one_of(group_by_names());
+      .one_of(shading::group_by_names());
   p.option("--sphere", a.words.sphere, "LIST",
            "textures seen as in a mirror: texture, detail, reflection, structure, none");
   p.option("--filter", a.words.filter, "WORD", "nearest, linear, mipmap; or TEXTURE=WORD,...");
@@ -241,9 +245,9 @@ void declare(Program& p, RenderArguments& a) {
       .range(0, 180);
   declare_camera(p, a);
   p.option("--backend", a.words.backend, "NAME", "gl, cpu; auto: gl on a graphics card")
-      .one_of(backend_names());
+      .one_of(render::backend_names());
   p.option("--passes", a.words.passes, "N", "algorithm of OpenGL: 3, 2, 1 or shader")
-      .one_of(gl_mode_names());
+      .one_of(gl::gl_mode_names());
   p.option("--gl-target", a.words.target, "KIND", "precision of OpenGL's colours: float, 8bit")
       .one_of({"float", "8bit"});
   p.option("--rgb-scale", a.words.rgb_scale, "S",

@@ -22,9 +22,9 @@ namespace gewebe::cli {
 
 /// One of the four textures.
 struct RenderLayer {
-  std::string path;                  ///< "": absent
-  std::optional<SolidTexture> solid; ///< instead of a file
-  TextureOptions options;
+  std::string path;                           ///< "": absent
+  std::optional<texture::SolidTexture> solid; ///< instead of a file
+  texture::TextureOptions options;
 };
 
 /// What a material, a part or an object has for itself; the rest is as for all.
@@ -38,16 +38,16 @@ struct RenderMaterial {
 struct RenderVolume {
   std::string slice, maximum, translucent, ramp;
   std::vector<double> range;
-  VolumeViewOptions view; ///< its mode, axis and place
+  shading::VolumeViewOptions view; ///< its mode, axis and place
 };
 
 struct RenderArguments {
   std::string surface = "-";
   RenderLayer base, detail, reflection, structure;
   std::map<std::int32_t, RenderMaterial> materials;
-  SurfaceMaterial common;      ///< colours; its textures are read later
-  bool field_material = false; ///< --field material: colours of materials
-  bool tissue_colors = false;  ///< what has neither colour nor texture has that of its material
+  texture::SurfaceMaterial common; ///< colours; its textures are read later
+  bool field_material = false;     ///< --field material: colours of materials
+  bool tissue_colors = false;      ///< what has neither colour nor texture has that of its material
   std::optional<Vec3> light;
   std::optional<double> wet, wet_roughness; ///< the film on all
   std::optional<double> occlusion_radius;   ///< mm
@@ -65,12 +65,12 @@ struct RenderArguments {
   std::optional<double> rate;                   ///< of a film, pictures per second
   bool no_instruments = false;                  ///< of a result
   std::optional<Vec3> instrument_color;         ///< else that of steel
-  CameraOptions camera;
-  DrawingOptions drawing;
-  UvOptions mapping;
-  PictureOptions picture;
+  shading::CameraOptions camera;
+  shading::DrawingOptions drawing;
+  shading::UvOptions mapping;
+  render::PictureOptions picture;
   RenderVolume volume;
-  ColorRamp ramp;                        ///< of a field, see take_field
+  texture::ColorRamp ramp;               ///< of a field, see take_field
   bool legend = false;                   ///< pictures have one
   std::vector<std::string> look_options; ///< given options of looks and views
 

@@ -18,7 +18,7 @@ void refuse(bool wrong, const std::string& what) {
 void declare_camera(Program& p, RenderArguments& a) {
   p.option("--view", a.words.view, "SIDE",
            "front (if no --eye), back, left, right, top, bottom, iso")
-      .one_of(view_names());
+      .one_of(shading::view_names());
   p.option("--orbit", a.words.orbit, "AZ,EL", "degrees to walk around to the right, and up")
       .count(2);
   p.option("--distance", a.camera.distance, "MM", "distance of the camera; default: all is visible")
@@ -42,13 +42,13 @@ void complete_camera(RenderArguments& a) {
          "--eye with --view or --distance, expected one way to place the camera");
   if (!a.words.view.empty())
     a.camera.view = a.words.view;
-  a.camera.fov = a.words.fov.value_or(a.endoscope ? endoscope_fov : a.camera.fov);
+  a.camera.fov = a.words.fov.value_or(a.endoscope ? shading::endoscope_fov : a.camera.fov);
   a.camera.azimuth = a.words.orbit[0];
   a.camera.elevation = a.words.orbit[1];
   refuse(!(std::abs(a.camera.azimuth) <= 3600 && std::abs(a.camera.elevation) <= 90),
          "--orbit: expected an azimuth up to 3600 and an elevation from -90 to 90 degrees");
   try {
-    std::tie(a.picture.width, a.picture.height) = picture_size_from_text(a.words.size);
+    std::tie(a.picture.width, a.picture.height) = render::picture_size_from_text(a.words.size);
   } catch (const Error& error) {
     throw UsageError(std::string("--size: ") + error.what());
   }

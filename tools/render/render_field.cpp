@@ -11,7 +11,7 @@
 namespace gewebe::cli {
 
 void declare_field(Program& p, RenderArguments& a) {
-  std::vector<std::string> names = result_field_names();
+  std::vector<std::string> names = formats::result_field_names();
   names.emplace_back("material");
   p.option("--field", a.reading.field, "NAME",
            "colour by material; of results by displacement or von-mises")
@@ -38,7 +38,7 @@ void complete_field(RenderArguments& a) {
   a.reading.field.clear();
 }
 
-void take_field(Run& run, RenderArguments& a, const Input& input,
+void take_field(Run& run, RenderArguments& a, const formats::Input& input,
                 const std::vector<std::int64_t>& frames) {
   if (a.reading.field.empty())
     return;

@@ -16,7 +16,7 @@ void complete_field(RenderArguments& arguments);
 
 /// Gives the surface the ramp as its base and the reading the field's range: that of --range, else
 /// that of the drawn objects in the frames. \throw Error with place
-void take_field(Run& run, RenderArguments& arguments, const Input& input,
+void take_field(Run& run, RenderArguments& arguments, const formats::Input& input,
                 const std::vector<std::int64_t>& frames);
 
 } // namespace gewebe::cli

@@ -12,24 +12,24 @@ void refuse(bool wrong, const std::string& what) {
 
 /// "noise" and "veins", which are no files.
 void complete_solid(const std::string& word, RenderLayer& layer) {
-  if (!is_solid_texture(layer.path))
+  if (!texture::is_solid_texture(layer.path))
     return;
   const std::string option = "--" + word;
   refuse(option == "--reflection",
          "--reflection: '" + layer.path + "' is no picture of the surroundings, expected a file");
   refuse(layer.options.sphere, "--sphere: " + word + " is solid, expected a texture from a file");
   try {
-    layer.solid = solid_texture_from_text(layer.path);
+    layer.solid = texture::solid_texture_from_text(layer.path);
   } catch (const Error& error) {
     throw UsageError(option + ": " + error.what());
   }
   refuse(option == "--structure" && (layer.path.find("ground=") != std::string::npos ||
                                      layer.path.find("color=") != std::string::npos),
          "--structure: heights have no colour, expected neither ground nor color");
-  layer.solid->filtered = layer.options.filter == TextureFilter::mipmap;
+  layer.solid->filtered = layer.options.filter == texture::TextureFilter::mipmap;
 }
 
-void take(std::optional<Texture>& image, std::optional<SolidTexture>& solid,
+void take(std::optional<texture::Texture>& image, std::optional<texture::SolidTexture>& solid,
           const RenderLayer& layer, const Context& context) {
   if (layer.path.empty())
     return;
@@ -37,8 +37,8 @@ void take(std::optional<Texture>& image, std::optional<SolidTexture>& solid,
   solid = layer.solid;
   if (solid)
     return;
-  Input input(layer.path);
-  image = texture_from(read_image(input, context), layer.options);
+  formats::Input input(layer.path);
+  image = texture::texture_from(formats::read_image(input, context), layer.options);
 }
 
 } // namespace
@@ -47,7 +47,7 @@ void complete_layer(RenderArguments& a, const std::string& word, RenderLayer& la
   if (layer.path.empty())
     return;
   complete_solid(word, layer);
-  DrawingOptions& drawing = a.drawing;
+  shading::DrawingOptions& drawing = a.drawing;
   const bool structure = word == "structure";
   if (layer.solid || (a.words.uv == "triplanar" && !layer.options.sphere)) {
     drawing.rest = true;
@@ -61,13 +61,15 @@ void complete_layer(RenderArguments& a, const std::string& word, RenderLayer& la
   drawing.texcoords = drawing.texcoords || structure;
 }
 
-void take_textures(SurfaceMaterial& material, const RenderLayers& layers, const Context& context) {
+void take_textures(texture::SurfaceMaterial& material, const RenderLayers& layers,
+                   const Context& context) {
   const auto& [base, detail, reflection, structure] = layers;
   take(material.base, material.solid_base, *base, context);
   take(material.detail, material.solid_detail, *detail, context);
   if (!reflection->path.empty()) {
-    Input input(reflection->path);
-    material.reflection = texture_from(read_image(input, context), reflection->options);
+    formats::Input input(reflection->path);
+    material.reflection =
+        texture::texture_from(formats::read_image(input, context), reflection->options);
   }
   if (structure->path.empty())
     return;
@@ -75,8 +77,9 @@ void take_textures(SurfaceMaterial& material, const RenderLayers& layers, const 
   material.solid_structure = structure->solid;
   if (material.solid_structure)
     return;
-  Input input(structure->path);
-  material.structure = texture_from(read_heights(input, context), structure->options);
+  formats::Input input(structure->path);
+  material.structure =
+      texture::texture_from(formats::read_heights(input, context), structure->options);
 }
 
 } // namespace gewebe::cli

@@ -16,6 +16,7 @@ using RenderLayers = std::array<const RenderLayer*, 4>;
 void complete_layer(RenderArguments& arguments, const std::string& word, RenderLayer& layer);
 
 /// Gives `material` those that are there in place of its own. \throw Error with place
-void take_textures(SurfaceMaterial& material, const RenderLayers& layers, const Context& context);
+void take_textures(texture::SurfaceMaterial& material, const RenderLayers& layers,
+                   const Context& context);
 
 } // namespace gewebe::cli

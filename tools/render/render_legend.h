@@ -20,18 +20,19 @@ void complete_legend(RenderArguments& arguments);
 class SurfaceLegends {
 public:
   /// Reads the times of a result. \pre take_field is done \throw Error with place
-  SurfaceLegends(const RenderArguments& arguments, const Input& input);
+  SurfaceLegends(const RenderArguments& arguments, const formats::Input& input);
   /// Draws that of a picture of a frame (-1: the last). \return whether it is that before it
-  bool draw(Image& picture, const Camera& camera, std::int64_t frame);
+  bool draw(texture::Image& picture, const shading::Camera& camera, std::int64_t frame);
 
 private:
   const RenderArguments& arguments_;
   std::vector<double> times_; ///< of a result
-  Legend last_;
+  texture::Legend last_;
 };
 
 /// Legend of a volume's picture. \param mm_per_pixel as in Legend
-void draw_volume_legend(Image& picture, const RenderArguments& arguments, const ColorRamp& ramp,
-                        const std::array<double, 2>& range, double mm_per_pixel);
+void draw_volume_legend(texture::Image& picture, const RenderArguments& arguments,
+                        const texture::ColorRamp& ramp, const std::array<double, 2>& range,
+                        double mm_per_pixel);
 
 } // namespace gewebe::cli

@@ -71,18 +71,18 @@ void complete_lighting(RenderArguments& a) {
          "--tbn vertex for --wet, expected pixel or auto");
 }
 
-void add_inside_material(SurfaceMaterial& common, const RenderArguments& a) {
+void add_inside_material(texture::SurfaceMaterial& common, const RenderArguments& a) {
   if (!a.inside)
     return;
-  SurfaceMaterial own;
+  texture::SurfaceMaterial own;
   own.color = *a.inside;
   own.background = common.background;
   own.film = film_of(a, nullptr);
   common.others.push_back(std::move(own));
 }
 
-WetFilm film_of(const RenderArguments& a, const RenderMaterial* own) {
-  WetFilm film;
+texture::WetFilm film_of(const RenderArguments& a, const RenderMaterial* own) {
+  texture::WetFilm film;
   film.amount = a.wet.value_or(0);
   film.roughness = a.wet_roughness.value_or(film.roughness);
   if (own != nullptr) {

@@ -14,9 +14,9 @@ void declare_lighting(Program& program, RenderArguments& arguments);
 void complete_lighting(RenderArguments& arguments);
 
 /// Adds the group of what is seen from within behind those of tissue, if it has a colour.
-void add_inside_material(SurfaceMaterial& common, const RenderArguments& arguments);
+void add_inside_material(texture::SurfaceMaterial& common, const RenderArguments& arguments);
 
 /// The film of a material that was given one of its own, or that of all.
-WetFilm film_of(const RenderArguments& arguments, const RenderMaterial* own);
+texture::WetFilm film_of(const RenderArguments& arguments, const RenderMaterial* own);
 
 } // namespace gewebe::cli

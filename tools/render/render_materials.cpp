@@ -19,14 +19,15 @@ constexpr std::array<RenderLayer RenderMaterial::*, 4> layers{
 constexpr std::array<const char*, 4> words{"texture", "detail", "reflection", "structure"};
 
 /// The numbers of materials, parts or objects that the triangles have.
-std::set<std::int32_t> numbers_of(const std::vector<Surface>& surfaces, GroupBy by) {
+std::set<std::int32_t> numbers_of(const std::vector<shading::Surface>& surfaces,
+                                  shading::GroupBy by) {
   std::set<std::int32_t> numbers;
   for (std::size_t s = 0; s < surfaces.size(); ++s) {
     const TriangleMesh& mesh = surfaces[s].mesh;
     if (surfaces[s].instrument || mesh.triangles.empty())
       continue;
-    const std::vector<std::int32_t>& own = by == GroupBy::part ? mesh.part : mesh.material;
-    if (by == GroupBy::surface)
+    const std::vector<std::int32_t>& own = by == shading::GroupBy::part ? mesh.part : mesh.material;
+    if (by == shading::GroupBy::surface)
       numbers.insert(static_cast<std::int32_t>(s));
     else if (own.empty())
       numbers.insert(0);
@@ -42,7 +43,7 @@ void complete_materials(RenderArguments& a) {
   if (a.materials.empty() && a.words.by != "material")
     throw UsageError("--by without a number before a texture or colour, expected such as "
                      "--texture 1=FILE");
-  a.drawing.group_by = group_by_from_name(a.words.by);
+  a.drawing.group_by = shading::group_by_from_name(a.words.by);
   for (auto& [number, material] : a.materials) {
     a.drawing.groups.push_back(number);
     const RenderLayers of_all{&a.base, &a.detail, &a.reflection, &a.structure};
@@ -69,12 +70,12 @@ std::vector<std::string> material_paths(const RenderArguments& a) {
   return paths;
 }
 
-void add_group_materials(SurfaceMaterial& common, const RenderArguments& a,
-                         const std::vector<Surface>& surfaces, const Context& context) {
+void add_group_materials(texture::SurfaceMaterial& common, const RenderArguments& a,
+                         const std::vector<shading::Surface>& surfaces, const Context& context) {
   const std::set<std::int32_t> used = numbers_of(surfaces, a.drawing.group_by);
-  std::vector<SurfaceMaterial> others;
+  std::vector<texture::SurfaceMaterial> others;
   for (const auto& [number, material] : a.materials) {
-    SurfaceMaterial& own = others.emplace_back(common);
+    texture::SurfaceMaterial& own = others.emplace_back(common);
     if (!a.frames.empty() || used.contains(number)) // a cut shows what lies inside
       take_textures(own,
                     {&material.base, &material.detail, &material.reflection, &material.structure},
@@ -85,8 +86,8 @@ void add_group_materials(SurfaceMaterial& common, const RenderArguments& a,
   common.others = std::move(others);
 }
 
-void take_instruments(RenderArguments& a, const Input& input) {
-  if (a.reading.kind != Kind::hdf5) {
+void take_instruments(RenderArguments& a, const formats::Input& input) {
+  if (a.reading.kind != formats::Kind::hdf5) {
     if (a.no_instruments || a.instrument_color)
       throw UsageError(input.name(),
                        "--instrument-color or --no-instruments for no result of a run, "
@@ -95,20 +96,20 @@ void take_instruments(RenderArguments& a, const Input& input) {
   }
   constexpr std::size_t smooth = 128, coarse = 32;
   if (!a.no_instruments && a.reading.object.empty() && input.name() != "-" &&
-      !read_result_index(input.name()).instruments.empty())
+      !formats::read_result_index(input.name()).instruments.empty())
     a.reading.ring = a.style == "textured" ? smooth : coarse;
 }
 
-void add_instrument_material(SurfaceMaterial& common, const RenderArguments& a,
-                             DrawingOptions& drawing) {
+void add_instrument_material(texture::SurfaceMaterial& common, const RenderArguments& a,
+                             shading::DrawingOptions& drawing) {
   if (a.reading.ring == 0)
     return;
   constexpr Vec3 steel{0.75, 0.77, 0.8};
-  SurfaceMaterial own;
+  texture::SurfaceMaterial own;
   own.color = a.instrument_color.value_or(a.style == "wireframe" ? a.common.color : steel);
   own.background = common.background;
   own.film = film_of(a, nullptr);
-  own.film.reflectance = steel_reflectance;
+  own.film.reflectance = texture::steel_reflectance;
   common.others.push_back(std::move(own));
   drawing.instruments = true;
 }
@@ -117,26 +118,26 @@ namespace {
 
 using Colors = std::map<std::int32_t, Vec3>;
 
-Vec3 color_of(const Colors& colors, const Surface& surface, std::size_t material) {
+Vec3 color_of(const Colors& colors, const shading::Surface& surface, std::size_t material) {
   if (const auto found = colors.find(static_cast<std::int32_t>(material)); found != colors.end())
     return found->second;
-  return tissue_color(material < surface.materials.size() ? surface.materials[material] : "",
-                      material);
+  return texture::tissue_color(
+      material < surface.materials.size() ? surface.materials[material] : "", material);
 }
 
 /// A base from an image has its own colours.
-bool takes_tissue_color(const SurfaceMaterial& common) {
+bool takes_tissue_color(const texture::SurfaceMaterial& common) {
   return !common.base;
 }
 
 } // namespace
 
-TissueColors::TissueColors(const RenderArguments& a, const std::vector<Surface>& surfaces,
-                           SurfaceMaterial& common, DrawingOptions& drawing) {
+TissueColors::TissueColors(const RenderArguments& a, const std::vector<shading::Surface>& surfaces,
+                           texture::SurfaceMaterial& common, shading::DrawingOptions& drawing) {
   if (!a.tissue_colors || surfaces.empty())
     return;
-  for (const Surface& surface : surfaces)
-    of_surfaces_.push_back(tissue_colors(surface.mesh, surface.materials));
+  for (const shading::Surface& surface : surfaces)
+    of_surfaces_.push_back(texture::tissue_colors(surface.mesh, surface.materials));
   if (!a.materials.empty()) { // as they are numbered there
     const auto color = [&](std::size_t surface, std::size_t material) {
       return color_of(of_surfaces_[surface], surfaces[surface], material);
@@ -157,7 +158,7 @@ TissueColors::TissueColors(const RenderArguments& a, const std::vector<Surface>&
     return;
   renumbers_ = true;
   for (std::size_t s = 0; s < surfaces.size(); ++s) {
-    const Surface& surface = surfaces[s];
+    const shading::Surface& surface = surfaces[s];
     if (surface.instrument)
       continue;
     std::vector<std::int32_t> numbers = surface.mesh.material;
@@ -175,20 +176,20 @@ TissueColors::TissueColors(const RenderArguments& a, const std::vector<Surface>&
   if (colors_.empty())
     return;
   common.color = colors_.front();
-  drawing.group_by = GroupBy::material;
+  drawing.group_by = shading::GroupBy::material;
   for (std::size_t n = 1; n < colors_.size(); ++n) {
     drawing.groups.push_back(static_cast<std::int32_t>(n));
-    SurfaceMaterial& own = common.others.emplace_back(common);
+    texture::SurfaceMaterial& own = common.others.emplace_back(common);
     own.others.clear();
     own.color = colors_[n];
   }
 }
 
-void TissueColors::number_materials(std::vector<Surface>& surfaces) const {
+void TissueColors::number_materials(std::vector<shading::Surface>& surfaces) const {
   if (!renumbers_ || colors_.size() < 2)
     return;
   for (std::size_t s = 0; s < surfaces.size(); ++s) {
-    Surface& surface = surfaces[s];
+    shading::Surface& surface = surfaces[s];
     if (surface.instrument)
       continue;
     surface.mesh.material.resize(surface.mesh.triangles.size());

@@ -69,13 +69,13 @@ const std::vector<std::string>& view_options() {
   return names;
 }
 
-void refuse_options(const RenderArguments& a, Kind to) {
+void refuse_options(const RenderArguments& a, formats::Kind to) {
   for (const std::string& name : a.look_options) {
     const bool view = std::ranges::find(view_options(), name) != view_options().end();
     if (!view)
-      throw UsageError(name + " for " + std::string(kind_name(to)) +
+      throw UsageError(name + " for " + std::string(formats::kind_name(to)) +
                        ", which has no such look, expected a picture or no " + name);
-    if (to == Kind::glb)
+    if (to == formats::Kind::glb)
       throw UsageError(name +
                        " for glb, whose viewers have views and lights of their own, "
                        "expected html, a picture or no " +
@@ -83,8 +83,8 @@ void refuse_options(const RenderArguments& a, Kind to) {
   }
 }
 
-std::vector<std::int64_t> frames_of(const RenderArguments& a, const Input& input) {
-  if (a.reading.kind != Kind::hdf5) {
+std::vector<std::int64_t> frames_of(const RenderArguments& a, const formats::Input& input) {
+  if (a.reading.kind != formats::Kind::hdf5) {
     if (!a.frames.empty())
       throw UsageError(input.name(), "--frames for no result of a run, expected --frames absent");
     return {};
@@ -95,14 +95,15 @@ std::vector<std::int64_t> frames_of(const RenderArguments& a, const Input& input
 }
 
 /// The field that the command line names is there, and has its range.
-void take_scene_field(Run& run, const RenderArguments& a, const Input& input, ShownScene& scene) {
+void take_scene_field(Run& run, const RenderArguments& a, const formats::Input& input,
+                      formats::ShownScene& scene) {
   if (a.reading.field.empty() && !a.volume.range.empty())
     throw UsageError("--range without --field, expected both");
   scene.view.field = a.reading.field;
   if (a.reading.field == "von-mises" && !scene.stored)
     throw Error(input.name(), "no drawn object has stress in a drawn frame, expected a scene with "
                               "'emit stress' before it");
-  for (std::optional<ShownField>* const field : {&scene.displacement, &scene.stored}) {
+  for (std::optional<formats::ShownField>* const field : {&scene.displacement, &scene.stored}) {
     if (!*field)
       continue;
     if ((*field)->name == a.reading.field && !a.volume.range.empty()) {
@@ -119,11 +120,11 @@ void take_scene_field(Run& run, const RenderArguments& a, const Input& input, Sh
   }
 }
 
-void set_view(const RenderArguments& a, ShownScene& scene) {
+void set_view(const RenderArguments& a, formats::ShownScene& scene) {
   constexpr std::uint32_t square = 512;
   const Box3 box = scene.box.empty() ? Box3{{0, 0, 0}, {1, 1, 1}} : scene.box;
-  const Camera camera = make_camera(a.camera, box, square, square);
-  ShownView& view = scene.view;
+  const shading::Camera camera = shading::make_camera(a.camera, box, square, square);
+  formats::ShownView& view = scene.view;
   view.eye = camera.eye;
   view.target = camera.target;
   view.up = camera.up;
@@ -136,13 +137,13 @@ void set_view(const RenderArguments& a, ShownScene& scene) {
   scene.box = box;
 }
 
-std::string scene_digest(const ShownScene& scene) {
+std::string scene_digest(const formats::ShownScene& scene) {
   Digest digest;
   digest.add(scene.times);
-  for (const ShownPart& part : scene.parts) {
+  for (const formats::ShownPart& part : scene.parts) {
     digest.add(part.triangles);
     digest.add(part.rest);
-    for (const ShownPaint& paint : part.paints) {
+    for (const formats::ShownPaint& paint : part.paints) {
       digest.add(std::uint64_t{paint.triangles});
       digest.add_bytes(&paint.color, sizeof paint.color);
     }
@@ -151,7 +152,7 @@ std::string scene_digest(const ShownScene& scene) {
     for (const std::vector<double>& values : part.values)
       digest.add(values);
   }
-  for (const ShownInstrument& instrument : scene.instruments)
+  for (const formats::ShownInstrument& instrument : scene.instruments)
     for (const auto& there : instrument.place_and_force)
       if (there)
         digest.add_bytes(&*there, sizeof *there);
@@ -167,23 +168,24 @@ void note_look_options(const Program& program, RenderArguments& a) {
         a.look_options.push_back(name);
 }
 
-const std::vector<Kind>& scene_kinds() {
-  static const std::vector<Kind> kinds{Kind::html, Kind::glb};
+const std::vector<formats::Kind>& scene_kinds() {
+  static const std::vector<formats::Kind> kinds{formats::Kind::html, formats::Kind::glb};
   return kinds;
 }
 
-void write_scene(Run& run, const RenderArguments& a, Input& input, Kind to) {
-  if (a.reading.kind == Kind::vdb)
-    throw UsageError(input.name(), "a volume for " + std::string(kind_name(to)) +
+void write_scene(Run& run, const RenderArguments& a, formats::Input& input, formats::Kind to) {
+  if (a.reading.kind == formats::Kind::vdb)
+    throw UsageError(input.name(), "a volume for " + std::string(formats::kind_name(to)) +
                                        ", expected a surface (mc-opt makes one)");
   refuse_options(a, to);
-  Output output(run.output(), run.output_options(to != Kind::html));
+  formats::Output output(run.output(), run.output_options(to != formats::Kind::html));
   const std::vector<std::int64_t> frames = frames_of(a, input);
-  ShownScene scene = run.timed("read", [&] { return build_scene(run, a, input, frames); });
+  formats::ShownScene scene = run.timed("read", [&] { return build_scene(run, a, input, frames); });
   take_scene_field(run, a, input, scene);
   set_view(a, scene);
   const std::uint64_t size = run.timed("write", [&] {
-    return to == Kind::glb ? write_glb(output, scene) : write_page(output, scene);
+    return to == formats::Kind::glb ? formats::write_glb(output, scene)
+                                    : formats::write_page(output, scene);
   });
   output.commit();
   constexpr std::uint64_t large = 100'000'000;

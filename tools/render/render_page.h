@@ -11,10 +11,11 @@ namespace gewebe::cli {
 void note_look_options(const Program& program, RenderArguments& arguments);
 
 /// html and glb.
-const std::vector<Kind>& scene_kinds();
+const std::vector<formats::Kind>& scene_kinds();
 
 /// Reads the input, builds the scene and writes it. \throw UsageError for options that the kind
 /// cannot serve; Error with place
-void write_scene(Run& run, const RenderArguments& arguments, Input& input, Kind to);
+void write_scene(Run& run, const RenderArguments& arguments, formats::Input& input,
+                 formats::Kind to);
 
 } // namespace gewebe::cli

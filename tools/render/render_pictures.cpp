@@ -15,25 +15,26 @@ namespace gewebe::cli {
 namespace {
 
 /// The material with its textures; textures that are not requested are not read.
-SurfaceMaterial material_of(const RenderArguments& a, const std::vector<Surface>& surfaces,
-                            const Context& context) {
-  SurfaceMaterial material = a.common;
+texture::SurfaceMaterial material_of(const RenderArguments& a,
+                                     const std::vector<shading::Surface>& surfaces,
+                                     const Context& context) {
+  texture::SurfaceMaterial material = a.common;
   material.film = film_of(a, nullptr);
   take_textures(material, {&a.base, &a.detail, &a.reflection, &a.structure}, context);
   add_group_materials(material, a, surfaces, context);
   return material;
 }
 
-std::vector<PictureOptions> options_of(const RenderArguments& a) {
+std::vector<render::PictureOptions> options_of(const RenderArguments& a) {
   if (a.compare.empty())
     return {a.picture};
-  std::vector<PictureOptions> all;
+  std::vector<render::PictureOptions> all;
   for (const std::string& mode : a.compare) {
-    PictureOptions options = a.picture;
-    options.backend = mode == "cpu" ? Backend::cpu : Backend::gl;
+    render::PictureOptions options = a.picture;
+    options.backend = mode == "cpu" ? render::Backend::cpu : render::Backend::gl;
     if (mode != "cpu")
-      options.gl.mode = gl_mode_from_name(mode);
-    if (mode != "cpu" && options.gl.mode != GlMode::shader)
+      options.gl.mode = gl::gl_mode_from_name(mode);
+    if (mode != "cpu" && options.gl.mode != gl::GlMode::shader)
       options.per_pixel.reset();
     all.push_back(options);
   }
@@ -41,10 +42,11 @@ std::vector<PictureOptions> options_of(const RenderArguments& a) {
 }
 
 /// The light walked around the target, about what points up in the picture.
-Vec3 rotated_light(const Vec3& light, const Camera& camera, double part, bool directional) {
+Vec3 rotated_light(const Vec3& light, const shading::Camera& camera, double part,
+                   bool directional) {
   const Vec3 from = directional ? Vec3{} : camera.target, k = camera.up, v = light - from;
   const Vec3 along = k * dot(k, v), across = v - along;
-  const auto [cosine, sine] = cos_sin(360 * part);
+  const auto [cosine, sine] = shading::cos_sin(360 * part);
   return from + along + across * cosine + cross(k, across) * sine;
 }
 
@@ -54,22 +56,22 @@ Pictures::Pictures(Run& run, const RenderArguments& arguments)
     : run_(run), arguments_(arguments), options_(options_of(arguments)),
       drawing_(arguments.drawing) {}
 
-void Pictures::start(const std::vector<Surface>& surfaces) {
+void Pictures::start(const std::vector<shading::Surface>& surfaces) {
   const RenderArguments& a = arguments_;
   material_ = run_.timed("textures", [&] { return material_of(a, surfaces, run_.context()); });
-  box_ = rest_box(surfaces);
+  box_ = shading::rest_box(surfaces);
   camera_ = camera_of(0);
-  drawing_.light = a.light.value_or(default_light(*camera_));
+  drawing_.light = a.light.value_or(shading::default_light(*camera_));
   if (a.endoscope)
     drawing_.full_distance = a.reach.value_or(norm(camera_->eye - camera_->target));
   first_light_ = drawing_.light;
   drawing_.occlusion_radius = a.occlusion_radius.value_or(box_.longest_side() / 4);
   drawing_.offset = {a.offset, a.offset};
   const auto structured =
-      std::ranges::find_if(material_.others, [](const SurfaceMaterial& material) {
+      std::ranges::find_if(material_.others, [](const texture::SurfaceMaterial& material) {
         return material.structure.has_value();
       });
-  if (const SurfaceMaterial& material =
+  if (const texture::SurfaceMaterial& material =
           material_.structure || structured == material_.others.end() ? material_ : *structured;
       a.offset_texels && material.structure)
     drawing_.offset = {*a.offset_texels / material.structure->width(),
@@ -78,19 +80,19 @@ void Pictures::start(const std::vector<Surface>& surfaces) {
   add_inside_material(material_, a);
   add_instrument_material(material_, a, drawing_);
   if (drawing_.rest)
-    place_at_rest(material_, box_, a.mapping.edge);
+    texture::place_at_rest(material_, box_, a.mapping.edge);
   run_.timed("start", [&] {
-    for (const PictureOptions& options : options_)
-      modes_.push_back({std::make_unique<Painter>(material_, options, run_.context()), {}});
+    for (const render::PictureOptions& options : options_)
+      modes_.push_back({std::make_unique<render::Painter>(material_, options, run_.context()), {}});
   });
 }
 
-Camera Pictures::camera_of(std::uint64_t number) const {
+shading::Camera Pictures::camera_of(std::uint64_t number) const {
   const RenderArguments& a = arguments_;
-  CameraOptions options = a.camera;
+  shading::CameraOptions options = a.camera;
   if (a.turn)
     options.azimuth += 360.0 * static_cast<double>(number) / static_cast<double>(*a.turn);
-  return make_camera(options, box_, a.picture.width, a.picture.height);
+  return shading::make_camera(options, box_, a.picture.width, a.picture.height);
 }
 
 /// Places camera and light of a picture; whether one of them is elsewhere than before.
@@ -100,7 +102,7 @@ bool Pictures::place(std::uint64_t number) {
   camera_ = camera_of(number);
   drawing_.camera = *camera_;
   if (a.endoscope)
-    drawing_.light = endoscope_light(*camera_);
+    drawing_.light = shading::endoscope_light(*camera_);
   if (a.turn_light) {
     const double part = static_cast<double>(number) / static_cast<double>(*a.turn_light);
     drawing_.light = rotated_light(first_light_, *camera_, part, drawing_.directional);
@@ -108,22 +110,22 @@ bool Pictures::place(std::uint64_t number) {
   return drawing_.camera.eye != eye || drawing_.light != light;
 }
 
-std::vector<Surface> Pictures::styled(std::vector<Surface> surfaces) const {
-  for (Surface& surface : surfaces) {
+std::vector<shading::Surface> Pictures::styled(std::vector<shading::Surface> surfaces) const {
+  for (shading::Surface& surface : surfaces) {
     if (arguments_.style == "flat")
-      surface = faceted(surface);
+      surface = shading::faceted(surface);
     if (arguments_.style == "wireframe")
-      surface = wireframe(surface, *camera_, 1.25, arguments_.picture.height);
+      surface = shading::wireframe(surface, *camera_, 1.25, arguments_.picture.height);
   }
   if (arguments_.inside)
-    surfaces = two_sided(std::move(surfaces), camera_->eye);
+    surfaces = shading::two_sided(std::move(surfaces), camera_->eye);
   return surfaces;
 }
 
 namespace {
 
 /// Whether two surfaces have the same triangles, coordinates, materials and rest.
-bool same_but_points(const Surface& kept, const Surface& now, bool coordinates) {
+bool same_but_points(const shading::Surface& kept, const shading::Surface& now, bool coordinates) {
   const TriangleMesh &a = kept.mesh, &b = now.mesh;
   return a.points.size() == b.points.size() && a.triangles == b.triangles &&
          (!coordinates || b.texcoords.empty() || a.texcoords == b.texcoords) && a.part == b.part &&
@@ -133,7 +135,8 @@ bool same_but_points(const Surface& kept, const Surface& now, bool coordinates) 
 } // namespace
 
 /// What the surfaces have that those drawn last had not; takes them over.
-std::optional<DrawingChange> Pictures::take(std::vector<Surface> surfaces, bool placed) {
+std::optional<shading::DrawingChange> Pictures::take(std::vector<shading::Surface> surfaces,
+                                                     bool placed) {
   const auto each = [&](const auto& same) {
     return pictures_ > 1 && surfaces_.size() == surfaces.size() &&
            std::equal(surfaces_.begin(), surfaces_.end(), surfaces.begin(), same);
@@ -143,41 +146,41 @@ std::optional<DrawingChange> Pictures::take(std::vector<Surface> surfaces, bool 
     const bool same =
         pictures_ > 1 && plain_.size() == surfaces.size() &&
         std::equal(surfaces.begin(), surfaces.end(), plain_.begin(),
-                   [](const Surface& s, const Drawn& drawn) {
+                   [](const shading::Surface& s, const Drawn& drawn) {
                      return s.mesh.points == drawn.points && s.mesh.triangles == drawn.triangles;
                    });
     if (same && !placed)
       return std::nullopt;
     plain_.clear();
-    for (const Surface& surface : surfaces)
+    for (const shading::Surface& surface : surfaces)
       plain_.push_back({surface.mesh.points, surface.mesh.triangles});
     surfaces_ = styled(std::move(surfaces));
-    return DrawingChange::all;
+    return shading::DrawingChange::all;
   }
-  if (each([&](const Surface& kept, const Surface& now) {
+  if (each([&](const shading::Surface& kept, const shading::Surface& now) {
         return kept.mesh.points == now.mesh.points && kept.mesh.normals == now.mesh.normals &&
                kept.mesh.triangles == now.mesh.triangles &&
                (!drawing_.rest || kept.rest == now.rest);
       }))
-    return placed ? std::optional(DrawingChange::view) : std::nullopt;
+    return placed ? std::optional(shading::DrawingChange::view) : std::nullopt;
   const bool coordinates = !arguments_.mapping.mapping; // else they are made here
-  if (each([&](const Surface& kept, const Surface& now) {
+  if (each([&](const shading::Surface& kept, const shading::Surface& now) {
         return same_but_points(kept, now, coordinates);
       })) {
     for (std::size_t n = 0; n < surfaces.size(); ++n) {
       surfaces_[n].mesh.points = std::move(surfaces[n].mesh.points);
       surfaces_[n].mesh.normals = std::move(surfaces[n].mesh.normals);
     }
-    return DrawingChange::points;
+    return shading::DrawingChange::points;
   }
   surfaces_ = std::move(surfaces);
-  return DrawingChange::all;
+  return shading::DrawingChange::all;
 }
 
-const Image& Pictures::of(std::vector<Surface> surfaces) {
-  for (Surface& surface : surfaces)
+const texture::Image& Pictures::of(std::vector<shading::Surface> surfaces) {
+  for (shading::Surface& surface : surfaces)
     if (arguments_.crease && !surface.instrument)
-      surface = creased(surface, *arguments_.crease);
+      surface = shading::creased(surface, *arguments_.crease);
   if (modes_.empty())
     start(surfaces);
   tissue_->number_materials(surfaces);
@@ -188,16 +191,17 @@ const Image& Pictures::of(std::vector<Surface> surfaces) {
     ++kept_;
     return last_;
   }
-  if (*change == DrawingChange::all && drawing_.texcoords)
-    mapped_ = run_.timed(
-        "prepare", [&] { return add_texcoords(surfaces_, arguments_.mapping, run_.context()); });
-  std::vector<Image> images;
-  std::array<const Drawing*, 2> drawings{}; // by kind of vertex data
+  if (*change == shading::DrawingChange::all && drawing_.texcoords)
+    mapped_ = run_.timed("prepare", [&] {
+      return shading::add_texcoords(surfaces_, arguments_.mapping, run_.context());
+    });
+  std::vector<texture::Image> images;
+  std::array<const shading::Drawing*, 2> drawings{}; // by kind of vertex data
   for (Mode& mode : modes_) {
     drawing_.per_pixel = mode.painter->per_pixel();
-    const Drawing*& drawing = drawings[drawing_.per_pixel ? 1 : 0];
+    const shading::Drawing*& drawing = drawings[drawing_.per_pixel ? 1 : 0];
     if (drawing == nullptr) {
-      DrawingMaker& maker = makers_[drawing_.per_pixel ? 1 : 0];
+      shading::DrawingMaker& maker = makers_[drawing_.per_pixel ? 1 : 0];
       drawing = run_.timed(
           "prepare", [&] { return &maker.make(surfaces_, drawing_, *change, run_.context()); });
       tell_groups(*drawing);
@@ -205,23 +209,23 @@ const Image& Pictures::of(std::vector<Surface> surfaces) {
     images.push_back(
         run_.timed("draw", [&] { return mode.painter->paint(*drawing, *camera_, &mode.report); }));
     if (arguments_.endoscope)
-      look_through_endoscope(images.back(), *camera_);
+      shading::look_through_endoscope(images.back(), *camera_);
     if (pictures_ == 1 && !mode.report.gl_failure.empty())
       run_.warn(mode.report.gl_failure + "; drawn without OpenGL (--backend cpu)");
   }
-  last_ = images.size() == 1 ? std::move(images.front()) : side_by_side(images);
+  last_ = images.size() == 1 ? std::move(images.front()) : texture::side_by_side(images);
   return last_;
 }
 
 /// How many triangles have which material; one that none has is a mistake more likely than not.
-void Pictures::tell_groups(const Drawing& drawing) {
+void Pictures::tell_groups(const shading::Drawing& drawing) {
   if (groups_told_ || arguments_.materials.empty() || drawing.group_start.empty() ||
       drawing.triangles.empty())
     return;
   groups_told_ = true;
   std::vector<std::uint64_t> counts;
-  for (std::size_t g = 0; g < group_count(drawing); ++g)
-    counts.push_back(triangles_of_group(drawing, g).size());
+  for (std::size_t g = 0; g < shading::group_count(drawing); ++g)
+    counts.push_back(shading::triangles_of_group(drawing, g).size());
   run_.stats().set("triangles_by_look", counts);
   for (std::size_t g = 1; g <= drawing_.groups.size(); ++g)
     if (counts[g] == 0)
@@ -229,7 +233,7 @@ void Pictures::tell_groups(const Drawing& drawing) {
                 std::to_string(drawing_.groups[g - 1]));
 }
 
-void Pictures::tell(Stats& stats, const Image& last) const {
+void Pictures::tell(Stats& stats, const texture::Image& last) const {
   if (drawing_.texcoords)
     stats.set("surfaces_mapped", mapped_);
   stats.set("eye", camera_->eye);
@@ -237,8 +241,8 @@ void Pictures::tell(Stats& stats, const Image& last) const {
   stats.set("light", drawing_.light);
   stats.set("pictures", pictures_);
   stats.set("pictures_kept", kept_);
-  DrawingCounts counts;
-  for (const DrawingMaker& maker : makers_) {
+  shading::DrawingCounts counts;
+  for (const shading::DrawingMaker& maker : makers_) {
     counts.splits += maker.counts().splits;
     counts.frames += maker.counts().frames;
     counts.vertices += maker.counts().vertices;
@@ -246,18 +250,18 @@ void Pictures::tell(Stats& stats, const Image& last) const {
   stats.set("vertex_splits", counts.splits);
   stats.set("frames_made", counts.frames);
   stats.set("vertices_made", counts.vertices);
-  const PictureReport& told = modes_.back().report;
-  stats.set("backend", backend_names()[static_cast<std::size_t>(told.backend)]);
-  if (told.backend == Backend::gl) {
+  const render::PictureReport& told = modes_.back().report;
+  stats.set("backend", render::backend_names()[static_cast<std::size_t>(told.backend)]);
+  if (told.backend == render::Backend::gl) {
     stats.set("platform", told.platform);
     stats.set("renderer", told.renderer);
     stats.set("target", told.target);
   }
   stats.set("passes", told.passes);
-  if (told.backend == Backend::gl)
+  if (told.backend == render::Backend::gl)
     stats.set("uploads", told.uploads);
   stats.set("triangles_drawn", told.triangles);
-  if (told.backend == Backend::cpu)
+  if (told.backend == render::Backend::cpu)
     stats.set("samples_covered", told.covered);
   stats.set("width", std::uint64_t{last.width});
   stats.set("height", std::uint64_t{last.height});

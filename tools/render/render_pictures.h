@@ -23,13 +23,13 @@ class Pictures {
 public:
   Pictures(Run& run, const RenderArguments& arguments);
   /// Draws a picture; the first time it reads the textures. \throw Error with place
-  const Image& of(std::vector<Surface> surfaces);
+  const texture::Image& of(std::vector<shading::Surface> surfaces);
   /// Whether the last picture is that before it.
   bool kept() const { return kept_last_; }
   /// That of the last picture. \pre there is one
-  const Camera& camera() const { return *camera_; }
+  const shading::Camera& camera() const { return *camera_; }
   /// What is known at the end.
-  void tell(Stats& stats, const Image& last) const;
+  void tell(Stats& stats, const texture::Image& last) const;
 
 private:
   struct Drawn {
@@ -37,30 +37,30 @@ private:
     std::vector<Triangle> triangles;
   };
   struct Mode {
-    std::unique_ptr<Painter> painter;
-    PictureReport report;
+    std::unique_ptr<render::Painter> painter;
+    render::PictureReport report;
   };
-  void start(const std::vector<Surface>& surfaces);
-  Camera camera_of(std::uint64_t number) const;
+  void start(const std::vector<shading::Surface>& surfaces);
+  shading::Camera camera_of(std::uint64_t number) const;
   bool place(std::uint64_t number);
-  std::optional<DrawingChange> take(std::vector<Surface> surfaces, bool placed);
-  void tell_groups(const Drawing& drawing);
-  std::vector<Surface> styled(std::vector<Surface> surfaces) const;
+  std::optional<shading::DrawingChange> take(std::vector<shading::Surface> surfaces, bool placed);
+  void tell_groups(const shading::Drawing& drawing);
+  std::vector<shading::Surface> styled(std::vector<shading::Surface> surfaces) const;
 
   Run& run_;
   const RenderArguments& arguments_;
-  SurfaceMaterial material_;
-  std::vector<PictureOptions> options_; ///< of the modes to compare, or one
+  texture::SurfaceMaterial material_;
+  std::vector<render::PictureOptions> options_; ///< of the modes to compare, or one
   std::vector<Mode> modes_;
-  std::optional<Camera> camera_;
-  DrawingOptions drawing_;
+  std::optional<shading::Camera> camera_;
+  shading::DrawingOptions drawing_;
   std::optional<TissueColors> tissue_;
-  std::array<DrawingMaker, 2> makers_; ///< without and with frames for each pixel
-  std::vector<Surface> surfaces_;      ///< as they are drawn
-  std::vector<Drawn> plain_;           ///< surfaces drawn in another style
-  Box3 box_;                           ///< at rest
+  std::array<shading::DrawingMaker, 2> makers_; ///< without and with frames for each pixel
+  std::vector<shading::Surface> surfaces_;      ///< as they are drawn
+  std::vector<Drawn> plain_;                    ///< surfaces drawn in another style
+  Box3 box_;                                    ///< at rest
   Vec3 first_light_;
-  Image last_;
+  texture::Image last_;
   bool kept_last_ = false;
   bool groups_told_ = false;
   std::uint64_t pictures_ = 0, kept_ = 0, mapped_ = 0;

@@ -16,15 +16,15 @@ namespace gewebe::cli {
 namespace {
 
 bool is_ramp_name(const std::string& word) {
-  return std::ranges::find(color_ramp_names(), word) != color_ramp_names().end();
+  return std::ranges::find(texture::color_ramp_names(), word) != texture::color_ramp_names().end();
 }
 
-VolumeAxis axis_of(const std::string& option, const std::string& word) {
+shading::VolumeAxis axis_of(const std::string& option, const std::string& word) {
   const std::vector<std::string> names{"x", "y", "z", "view"};
   const auto found = std::ranges::find(names, word);
   if (found == names.end())
     throw UsageError(option + ": '" + word + "' is no axis, expected x, y, z or view");
-  return static_cast<VolumeAxis>(found - names.begin());
+  return static_cast<shading::VolumeAxis>(found - names.begin());
 }
 
 double place_of(const std::string& word) {
@@ -36,19 +36,19 @@ double place_of(const std::string& word) {
   return place;
 }
 
-void refuse(bool wrong, const Input& input, const std::string& what) {
+void refuse(bool wrong, const formats::Input& input, const std::string& what) {
   if (wrong)
     throw UsageError(input.name(), what);
 }
 
 } // namespace
 
-ColorRamp ramp_of(const std::string& word, const Context& context) {
+texture::ColorRamp ramp_of(const std::string& word, const Context& context) {
   if (is_ramp_name(word))
-    return color_ramp_from_name(word);
-  Input input(word);
-  const Image image = read_image(input, context);
-  return at(input.name(), [&] { return color_ramp_from_image(image); });
+    return texture::color_ramp_from_name(word);
+  formats::Input input(word);
+  const texture::Image image = formats::read_image(input, context);
+  return at(input.name(), [&] { return texture::color_ramp_from_image(image); });
 }
 
 void declare_volume(Program& p, RenderArguments& a) {
@@ -66,7 +66,7 @@ void declare_volume(Program& p, RenderArguments& a) {
       .positive();
   p.option("--ramp", a.volume.ramp, "RAMP",
            "colours of values: viridis, cividis, gray, heat, rainbow, or an image")
-      .such_as(color_ramp_names());
+      .such_as(texture::color_ramp_names());
   p.option("--range", a.volume.range, "A,B", "values of the first and last colour; default: all")
       .count(2);
 }
@@ -80,7 +80,7 @@ void complete_volume(RenderArguments& a) {
   if (v.view.transfer.extinction && v.translucent.empty())
     throw UsageError("--extinction without --translucent, expected both");
   if (!v.slice.empty()) {
-    v.view.mode = VolumeMode::slice;
+    v.view.mode = shading::VolumeMode::slice;
     const std::size_t mid = v.slice.find('=');
     v.view.axis = axis_of("--slice", v.slice.substr(0, mid));
     if (mid != std::string::npos)
@@ -88,20 +88,20 @@ void complete_volume(RenderArguments& a) {
   } else if (!v.maximum.empty()) {
     v.view.axis = axis_of("--maximum", v.maximum);
   } else if (!v.translucent.empty()) {
-    v.view.mode = VolumeMode::translucent;
+    v.view.mode = shading::VolumeMode::translucent;
     v.view.axis = axis_of("--translucent", v.translucent);
   }
   if (!v.range.empty() && !(v.range[0] < v.range[1]))
     throw UsageError("--range: expected two values, the smaller one first");
-  if (v.view.axis != VolumeAxis::view &&
+  if (v.view.axis != shading::VolumeAxis::view &&
       (a.camera.eye || !a.words.view.empty() || a.camera.azimuth != 0 || a.camera.elevation != 0))
     throw UsageError("--view, --orbit or --eye for an axis, expected the axis view");
 }
 
-void check_kind(const RenderArguments& a, const Input& input, Kind kind) {
+void check_kind(const RenderArguments& a, const formats::Input& input, formats::Kind kind) {
   const RenderVolume& v = a.volume;
   const bool field = !a.reading.field.empty();
-  if (kind != Kind::vdb)
+  if (kind != formats::Kind::vdb)
     return refuse(!v.slice.empty() || !v.maximum.empty() || !v.translucent.empty() ||
                       (!field && (!v.ramp.empty() || !v.range.empty())),
                   input,
@@ -131,39 +131,40 @@ void check_kind(const RenderArguments& a, const Input& input, Kind kind) {
 namespace {
 
 /// The colours of a translucent volume before a background.
-Image composed(const VolumeView& view, const Vec3& background) {
-  Image image{view.width, view.height, 3, {}};
+texture::Image composed(const shading::VolumeView& view, const Vec3& background) {
+  texture::Image image{view.width, view.height, 3, {}};
   image.values.reserve(view.colors.size());
   for (std::size_t n = 0; n < view.values.size(); ++n)
     for (std::size_t c = 0; c < 3; ++c)
       image.values.push_back(
-          stored(static_cast<double>(view.colors[3 * n + c]) +
-                 static_cast<double>(view.values[n]) * background[static_cast<int>(c)]));
+          texture::stored(static_cast<double>(view.colors[3 * n + c]) +
+                          static_cast<double>(view.values[n]) * background[static_cast<int>(c)]));
   return image;
 }
 
 } // namespace
 
-Image volume_picture(Run& run, const RenderArguments& a, Input& input) {
+texture::Image volume_picture(Run& run, const RenderArguments& a, formats::Input& input) {
   const Context& context = run.context();
-  const ColorRamp ramp = ramp_of(a.volume.ramp.empty() ? "gray" : a.volume.ramp, context);
-  VolumeViewOptions options = a.volume.view;
+  const texture::ColorRamp ramp = ramp_of(a.volume.ramp.empty() ? "gray" : a.volume.ramp, context);
+  shading::VolumeViewOptions options = a.volume.view;
   const std::uint32_t finer = static_cast<std::uint32_t>(a.words.supersample.value_or(1));
   options.camera = a.camera;
   options.width = a.picture.width * finer;
   options.height = a.picture.height * finer;
-  if (std::max(options.width, options.height) > max_picture_side)
+  if (std::max(options.width, options.height) > raster::max_picture_side)
     throw UsageError("--size times --supersample: expected sides up to " +
-                     std::to_string(max_picture_side));
-  const bool translucent = options.mode == VolumeMode::translucent;
+                     std::to_string(raster::max_picture_side));
+  const bool translucent = options.mode == shading::VolumeMode::translucent;
   if (translucent) {
     options.transfer.ramp = ramp;
     if (!a.volume.range.empty())
       options.transfer.range = {a.volume.range[0], a.volume.range[1]};
   }
   std::string bytes = run.timed("read", [&] { return input.read_all(context.max_memory); });
-  const VolumeView view = run.timed(
-      "draw", [&] { return view_volume_bytes(std::move(bytes), input.name(), options, context); });
+  const shading::VolumeView view = run.timed("draw", [&] {
+    return formats::view_volume_bytes(std::move(bytes), input.name(), options, context);
+  });
   double min = view.min, max = view.max;
   if (!a.volume.range.empty()) {
     min = a.volume.range[0];
@@ -172,9 +173,10 @@ Image volume_picture(Run& run, const RenderArguments& a, Input& input) {
     run.warn(input.name() + ": all values are equal");
     max = min + 1;
   }
-  Image image = shrunk(translucent ? composed(view, a.words.background.value_or(Vec3{}))
-                                   : colored(view.values, view.width, view.height, min, max, ramp),
-                       finer);
+  texture::Image image = texture::shrunk(
+      translucent ? composed(view, a.words.background.value_or(Vec3{}))
+                  : texture::colored(view.values, view.width, view.height, min, max, ramp),
+      finer);
   draw_volume_legend(image, a, ramp, {min, max}, 2 * view.half_width / image.width);
   const auto [low, high] = std::ranges::minmax_element(view.values);
   Stats& stats = run.stats();

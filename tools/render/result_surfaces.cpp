@@ -12,7 +12,7 @@
 #include <string>
 #include <utility>
 
-namespace gewebe {
+namespace gewebe::cli {
 namespace {
 
 constexpr std::uint32_t ramp_width = 1024;
@@ -23,11 +23,11 @@ struct Frame {
   std::size_t number = 0;
 };
 
-Frame frame_of(const Input& input, const std::string& object, std::int64_t frame) {
+Frame frame_of(const formats::Input& input, const std::string& object, std::int64_t frame) {
   const std::string& path = input.name();
   if (path == "-")
     throw Error(path, "a result comes by a pipe, expected the name of its file");
-  ResultIndex index = read_result_index(path);
+  formats::ResultIndex index = formats::read_result_index(path);
   const auto frames = static_cast<std::int64_t>(index.times.size());
   if (frame < -1 || frame >= frames || frames == 0)
     throw Error(path, "there is no frame " + std::to_string(frame) + ", expected 0 to " +
@@ -49,18 +49,20 @@ void lay_on(TriangleMesh& mesh, std::span<const double> values,
     mesh.texcoords.push_back({place(a), 0.5F, place(b), 0.5F, place(c), 0.5F});
 }
 
-Surface open_solid(const Frame& frame, const std::string& object, const SurfaceReadOptions& options,
-                   const std::vector<double>& values, SolidReport& report) {
-  ResultSolid read = read_result_solid(frame.path, object, frame.number);
-  Surface surface;
+shading::Surface open_solid(const Frame& frame, const std::string& object,
+                            const SurfaceReadOptions& options, const std::vector<double>& values,
+                            SolidReport& report) {
+  formats::ResultSolid read = formats::read_result_solid(frame.path, object, frame.number);
+  shading::Surface surface;
   if (!read.there)
     return surface;
   return at(frame.path, [&] {
-    TetMesh mesh = std::move(read.mesh);
+    tetrahedra::TetMesh mesh = std::move(read.mesh);
     mesh.points.swap(read.rest); // displaced it may have turned tetrahedra
     examine_solid(mesh, report);
     mesh.points.swap(read.rest);
-    TetClip left = cut_open(linear_parts(std::move(mesh)), *options.clip, report);
+    tetrahedra::TetClip left =
+        cut_open(tetrahedra::linear_parts(std::move(mesh)), *options.clip, report);
     surface.mesh = std::move(left.mesh);
     surface.materials = std::move(read.materials);
     surface.rest.reserve(left.origin.size());
@@ -84,19 +86,20 @@ std::size_t pieces_along(double length, double radius) {
 
 } // namespace
 
-Surface instrument_surface(ResultInstrument of, std::size_t ring) {
+shading::Surface instrument_surface(formats::ResultInstrument of, std::size_t ring) {
   const Vec3 along = of.ends[1] - of.ends[0];
   // Back into its own coordinates.
   const auto& m = of.rotation;
   const Vec3 axis = m[0] * along.x + m[1] * along.y + m[2] * along.z;
-  const bool sphere = of.kind == InstrumentKind::sphere, blade = of.kind == InstrumentKind::blade;
-  const double radius = shown_radius({of.radius, axis, of.friction, blade});
-  Surface surface;
+  const bool sphere = of.kind == contact::InstrumentKind::sphere,
+             blade = of.kind == contact::InstrumentKind::blade;
+  const double radius = contact::shown_radius({of.radius, axis, of.friction, blade});
+  shading::Surface surface;
   surface.instrument = true;
   const auto rotated = [&](const Vec3& r) {
     return Vec3{dot(m[0], r), dot(m[1], r), dot(m[2], r)};
   };
-  if (of.kind == InstrumentKind::mesh) {
+  if (of.kind == contact::InstrumentKind::mesh) {
     surface.mesh = std::move(of.surface);
     for (std::array<float, 3>& own : surface.mesh.normals) {
       const Vec3 n = rotated({own[0], own[1], own[2]});
@@ -110,9 +113,9 @@ Surface instrument_surface(ResultInstrument of, std::size_t ring) {
   }
   if (!(radius > 0))
     return surface;
-  InstrumentSurface own = sphere
-                              ? round_surface(radius, {}, ring)
-                              : round_surface(radius, axis, ring, pieces_along(norm(axis), radius));
+  contact::InstrumentSurface own =
+      sphere ? contact::round_surface(radius, {}, ring)
+             : contact::round_surface(radius, axis, ring, pieces_along(norm(axis), radius));
   for (std::size_t i = 0; i < own.points.size(); ++i) {
     surface.mesh.points.push_back(of.place + rotated(own.points[i]));
     const Vec3 n = rotated(own.normals[i]);
@@ -124,24 +127,25 @@ Surface instrument_surface(ResultInstrument of, std::size_t ring) {
   return surface;
 }
 
-std::vector<Surface> read_result_surfaces(const Input& input, const SurfaceReadOptions& options,
-                                          SolidReport& report) {
+std::vector<shading::Surface> read_result_surfaces(const formats::Input& input,
+                                                   const SurfaceReadOptions& options,
+                                                   SolidReport& report) {
   const Frame frame = frame_of(input, options.object, options.frame.value_or(-1));
   report = {};
-  std::vector<Surface> surfaces;
+  std::vector<shading::Surface> surfaces;
   for (const std::string& object : frame.objects) {
     std::vector<double> values;
     if (options.field_range)
-      values = read_result_values(frame.path, object, frame.number, options.field);
+      values = formats::read_result_values(frame.path, object, frame.number, options.field);
     if (options.clip) {
-      Surface left = open_solid(frame, object, options, values, report);
+      shading::Surface left = open_solid(frame, object, options, values, report);
       if (!left.mesh.triangles.empty())
         surfaces.push_back(std::move(left));
       continue;
     }
     // Values are those of nodes, which a skin has none of.
-    ResultSurface read =
-        read_result_surface(frame.path, object, frame.number, !options.field_range);
+    formats::ResultSurface read =
+        formats::read_result_surface(frame.path, object, frame.number, !options.field_range);
     if (!read.there && options.object.empty())
       continue;
     if (read.there && options.field_range)
@@ -151,12 +155,14 @@ std::vector<Surface> read_result_surfaces(const Input& input, const SurfaceReadO
   if (options.clip && surfaces.empty())
     throw Error(frame.path, takes_all_away);
   if (options.ring > 0)
-    for (ResultInstrument& instrument : read_result_instruments(frame.path, frame.number))
+    for (formats::ResultInstrument& instrument :
+         formats::read_result_instruments(frame.path, frame.number))
       surfaces.push_back(instrument_surface(std::move(instrument), options.ring));
   return surfaces;
 }
 
-std::array<double, 2> result_field_range(const Input& input, const SurfaceReadOptions& options,
+std::array<double, 2> result_field_range(const formats::Input& input,
+                                         const SurfaceReadOptions& options,
                                          const std::vector<std::int64_t>& frames) {
   std::array<double, 2> range{0, 0};
   bool any = false;
@@ -164,7 +170,7 @@ std::array<double, 2> result_field_range(const Input& input, const SurfaceReadOp
     const Frame frame = frame_of(input, options.object, number);
     for (const std::string& object : frame.objects)
       for (const double value :
-           read_result_values(frame.path, object, frame.number, options.field)) {
+           formats::read_result_values(frame.path, object, frame.number, options.field)) {
         range = any ? std::array{std::min(range[0], value), std::max(range[1], value)}
                     : std::array{value, value};
         any = true;
@@ -173,13 +179,14 @@ std::array<double, 2> result_field_range(const Input& input, const SurfaceReadOp
   return range;
 }
 
-Texture ramp_texture(const ColorRamp& ramp) {
+texture::Texture ramp_texture(const texture::ColorRamp& ramp) {
   std::vector<float> values;
   for (std::uint32_t x = 0; x < ramp_width; ++x)
     values.push_back(static_cast<float>(x));
-  TextureOptions options;
-  options.wrap = TextureWrap::clamp;
-  return texture_from(colored(values, ramp_width, 1, 0, ramp_width - 1, ramp), options);
+  texture::TextureOptions options;
+  options.wrap = texture::TextureWrap::clamp;
+  return texture::texture_from(texture::colored(values, ramp_width, 1, 0, ramp_width - 1, ramp),
+                               options);
 }
 
-} // namespace gewebe
+} // namespace gewebe::cli

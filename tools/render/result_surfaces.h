@@ -13,7 +13,7 @@
 #include <cstdint>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::cli {
 
 /// Objects in the order of the scene. With options.clip those that are cut as read_solid() does, at
 /// the displaced places of their nodes, quadratic elements as the eight of linear_parts(); the
@@ -23,19 +23,21 @@ namespace gewebe {
 /// around their own origin as the one at rest. \throw Error with place: a pipe, no such frame,
 /// object or field; with a plane also an object without tetrahedra, one that is not sound at rest,
 /// and a plane that takes all of all away
-std::vector<Surface> read_result_surfaces(const Input& input, const SurfaceReadOptions& options,
-                                          SolidReport& report);
+std::vector<shading::Surface> read_result_surfaces(const formats::Input& input,
+                                                   const SurfaceReadOptions& options,
+                                                   SolidReport& report);
 
 /// An instrument at its pose, with its own normals and its shape around its own origin as rest.
 /// \param ring  corners of its rings, as round_surface has them
-Surface instrument_surface(ResultInstrument of, std::size_t ring);
+shading::Surface instrument_surface(formats::ResultInstrument of, std::size_t ring);
 
 /// The least and the greatest value of options.field at any node of the drawn objects in some
 /// frames (-1 is the last). \throw Error as above
-std::array<double, 2> result_field_range(const Input& input, const SurfaceReadOptions& options,
+std::array<double, 2> result_field_range(const formats::Input& input,
+                                         const SurfaceReadOptions& options,
                                          const std::vector<std::int64_t>& frames);
 
 /// A ramp as the base texture of what has such coordinates.
-Texture ramp_texture(const ColorRamp& ramp);
+texture::Texture ramp_texture(const texture::ColorRamp& ramp);
 
-} // namespace gewebe
+} // namespace gewebe::cli

@@ -22,8 +22,9 @@ constexpr Vec3 steel{0.75, 0.77, 0.8};
 /// Colours of the materials of a surface.
 class PartColors {
 public:
-  PartColors(const RenderArguments& a, const Surface& surface)
-      : arguments_(a), surface_(surface), tissue_(tissue_colors(surface.mesh, surface.materials)) {}
+  PartColors(const RenderArguments& a, const shading::Surface& surface)
+      : arguments_(a), surface_(surface),
+        tissue_(texture::tissue_colors(surface.mesh, surface.materials)) {}
   Vec3 of(std::int32_t material) const {
     if (surface_.instrument)
       return arguments_.instrument_color.value_or(steel);
@@ -35,20 +36,20 @@ public:
     if (const auto found = tissue_.find(material); found != tissue_.end())
       return found->second;
     const auto number = static_cast<std::size_t>(material);
-    return tissue_color(number < surface_.materials.size() ? surface_.materials[number] : "",
-                        number);
+    return texture::tissue_color(
+        number < surface_.materials.size() ? surface_.materials[number] : "", number);
   }
 
 private:
   const RenderArguments& arguments_;
-  const Surface& surface_;
+  const shading::Surface& surface_;
   std::map<std::int32_t, Vec3> tissue_;
 };
 
 /// A new part with the triangles of the surface, sorted by material.
-ShownPart part_of(const std::string& name, const Surface& surface, std::size_t first,
-                  const RenderArguments& a) {
-  ShownPart part;
+formats::ShownPart part_of(const std::string& name, const shading::Surface& surface,
+                           std::size_t first, const RenderArguments& a) {
+  formats::ShownPart part;
   part.name = name;
   part.instrument = surface.instrument;
   part.first = first;
@@ -71,10 +72,10 @@ ShownPart part_of(const std::string& name, const Surface& surface, std::size_t f
 /// Joins surfaces of one name into parts while their triangles stay.
 class PartList {
 public:
-  PartList(const RenderArguments& arguments, ShownScene& scene)
+  PartList(const RenderArguments& arguments, formats::ShownScene& scene)
       : arguments_(arguments), scene_(scene) {}
 
-  void add(const std::string& name, Surface surface, std::vector<double> values,
+  void add(const std::string& name, shading::Surface surface, std::vector<double> values,
            std::size_t frame) {
     const auto key = std::make_pair(surface.instrument, name);
     Open& open = open_[key];
@@ -85,7 +86,7 @@ public:
       open.triangles = std::move(surface.mesh.triangles);
       open.material = std::move(surface.mesh.material);
     }
-    ShownPart& part = scene_.parts[open.part];
+    formats::ShownPart& part = scene_.parts[open.part];
     part.points.push_back(std::move(surface.mesh.points));
     part.values.push_back(std::move(values));
     open.next = frame + 1;
@@ -97,16 +98,17 @@ private:
     std::vector<Triangle> triangles;
     std::vector<std::int32_t> material;
   };
-  bool same_rest(const Open& open, const Surface& surface) const {
+  bool same_rest(const Open& open, const shading::Surface& surface) const {
     return surface.rest.empty() || scene_.parts[open.part].rest == surface.rest;
   }
   const RenderArguments& arguments_;
-  ShownScene& scene_;
+  formats::ShownScene& scene_;
   std::map<std::pair<bool, std::string>, Open> open_;
 };
 
-ShownCurve& curve_of(ShownScene& scene, const std::string& name, const std::string& unit) {
-  for (ShownCurve& curve : scene.curves)
+formats::ShownCurve& curve_of(formats::ShownScene& scene, const std::string& name,
+                              const std::string& unit) {
+  for (formats::ShownCurve& curve : scene.curves)
     if (curve.name == name)
       return curve;
   scene.curves.push_back({name, unit, {}});
@@ -115,7 +117,8 @@ ShownCurve& curve_of(ShownScene& scene, const std::string& name, const std::stri
 }
 
 /// Makes the field's ends include a value; the first one sets both.
-void include(std::optional<ShownField>& field, const ShownField& fresh, double value) {
+void include(std::optional<formats::ShownField>& field, const formats::ShownField& fresh,
+             double value) {
   if (!field) {
     field = fresh;
     field->least = field->greatest = value;
@@ -124,12 +127,12 @@ void include(std::optional<ShownField>& field, const ShownField& fresh, double v
   field->greatest = std::max(field->greatest, value);
 }
 
-void add_object(ShownScene& scene, PartList& parts, const std::string& path,
+void add_object(formats::ShownScene& scene, PartList& parts, const std::string& path,
                 const std::string& object, std::size_t frame, std::size_t number) {
-  ResultSurface read = read_result_surface(path, object, number);
+  formats::ResultSurface read = formats::read_result_surface(path, object, number);
   if (!read.there)
     return;
-  std::vector<double> stress = read_result_surface_stress(path, object, number);
+  std::vector<double> stress = formats::read_result_surface_stress(path, object, number);
   double farthest = 0;
   for (std::size_t i = 0; i < read.rest.size(); ++i) {
     const double length = norm(read.mesh.points[i] - read.rest[i]);
@@ -146,12 +149,12 @@ void add_object(ShownScene& scene, PartList& parts, const std::string& path,
             std::move(stress), frame);
 }
 
-void add_instrument(ShownScene& scene, PartList& parts, ResultInstrument of, std::size_t ring,
-                    std::size_t frame) {
+void add_instrument(formats::ShownScene& scene, PartList& parts, formats::ResultInstrument of,
+                    std::size_t ring, std::size_t frame) {
   const std::string name = of.name;
   const Vec3 force = of.force * 1e-6;
-  const auto found = std::ranges::find(scene.instruments, name, &ShownInstrument::name);
-  ShownInstrument& instrument =
+  const auto found = std::ranges::find(scene.instruments, name, &formats::ShownInstrument::name);
+  formats::ShownInstrument& instrument =
       found != scene.instruments.end() ? *found : scene.instruments.emplace_back();
   instrument.name = name;
   instrument.place_and_force.resize(scene.times.size());
@@ -161,14 +164,14 @@ void add_instrument(ShownScene& scene, PartList& parts, ResultInstrument of, std
   curve_of(scene, name + ": force along y", "N").values[frame] = force.y;
   curve_of(scene, name + ": force along z", "N").values[frame] = force.z;
   curve_of(scene, name + ": torque", "N mm").values[frame] = norm(of.torque) * 1e-6;
-  Surface surface = instrument_surface(std::move(of), ring);
+  shading::Surface surface = instrument_surface(std::move(of), ring);
   if (!surface.mesh.triangles.empty())
     parts.add(name, std::move(surface), {}, frame);
 }
 
 void add_result(Run& run, const RenderArguments& a, const std::string& path,
-                const std::vector<std::int64_t>& frames, ShownScene& scene) {
-  const ResultIndex index = read_result_index(path);
+                const std::vector<std::int64_t>& frames, formats::ShownScene& scene) {
+  const formats::ResultIndex index = formats::read_result_index(path);
   const std::vector<std::string> objects =
       a.reading.object.empty() ? index.objects : std::vector<std::string>{a.reading.object};
   for (const std::int64_t frame : frames)
@@ -179,22 +182,24 @@ void add_result(Run& run, const RenderArguments& a, const std::string& path,
     for (const std::string& object : objects)
       add_object(scene, parts, path, object, frame, number);
     if (a.reading.ring > 0)
-      for (ResultInstrument& of : read_result_instruments(path, number))
+      for (formats::ResultInstrument& of : formats::read_result_instruments(path, number))
         add_instrument(scene, parts, std::move(of), a.reading.ring, frame);
     // What was read, its packed form, and what comes.
     const double share = static_cast<double>(frame + 1) / static_cast<double>(frames.size());
     at(path, [&] {
-      require_memory(run.context(), 1.5 * scene_bytes(scene) / share, "the frames of the scene");
+      require_memory(run.context(), 1.5 * formats::scene_bytes(scene) / share,
+                     "the frames of the scene");
     });
   }
 }
 
-void add_surfaces(Run& run, const RenderArguments& a, Input& input, ShownScene& scene) {
+void add_surfaces(Run& run, const RenderArguments& a, formats::Input& input,
+                  formats::ShownScene& scene) {
   scene.times = {0};
   SurfaceReadOptions reading = a.reading;
   reading.clip.reset();
   SolidReport solid;
-  std::vector<Surface> surfaces = read_surfaces(input, reading, run.context(), &solid);
+  std::vector<shading::Surface> surfaces = read_surfaces(input, reading, run.context(), &solid);
   tell_solid(run, input.name(), reading, solid);
   PartList parts(a, scene);
   for (std::size_t n = 0; n < surfaces.size(); ++n)
@@ -204,17 +209,17 @@ void add_surfaces(Run& run, const RenderArguments& a, Input& input, ShownScene& 
 
 } // namespace
 
-ShownScene build_scene(Run& run, const RenderArguments& a, Input& input,
-                       const std::vector<std::int64_t>& frames) {
-  ShownScene scene;
+formats::ShownScene build_scene(Run& run, const RenderArguments& a, formats::Input& input,
+                                const std::vector<std::int64_t>& frames) {
+  formats::ShownScene scene;
   const std::size_t slash = input.name().find_last_of('/');
   scene.title = input.name() == "-" ? "Gewebe" : input.name().substr(slash + 1);
-  if (a.reading.kind == Kind::hdf5)
+  if (a.reading.kind == formats::Kind::hdf5)
     add_result(run, a, input.name(), frames, scene);
   else
     add_surfaces(run, a, input, scene);
   std::uint64_t triangles = 0;
-  for (const ShownPart& part : scene.parts) {
+  for (const formats::ShownPart& part : scene.parts) {
     triangles += part.triangles.size();
     if (!part.instrument)
       for (const Vec3& p : part.rest)
@@ -222,9 +227,10 @@ ShownScene build_scene(Run& run, const RenderArguments& a, Input& input,
   }
   if (triangles == 0)
     run.warn(input.name() + ": no triangle to draw");
-  const ColorRamp ramp = ramp_of(a.volume.ramp.empty() ? "viridis" : a.volume.ramp, run.context());
+  const texture::ColorRamp ramp =
+      ramp_of(a.volume.ramp.empty() ? "viridis" : a.volume.ramp, run.context());
   for (int n = 0; n < 256; ++n) {
-    const std::array<double, 3> color = ramp_color(ramp, n / 255.0);
+    const std::array<double, 3> color = texture::ramp_color(ramp, n / 255.0);
     scene.ramp.push_back({static_cast<std::uint8_t>(std::floor(color[0] + 0.5)),
                           static_cast<std::uint8_t>(std::floor(color[1] + 0.5)),
                           static_cast<std::uint8_t>(std::floor(color[2] + 0.5))});

@@ -15,7 +15,7 @@ namespace gewebe::cli {
 /// curves: the greatest displacement and stress of each object, forces and torques on instruments.
 /// \param frames of a result; ignored for others, which have one frame at time 0
 /// \throw Error with place, also if the scene needs more memory than the run may use
-ShownScene build_scene(Run& run, const RenderArguments& arguments, Input& input,
-                       const std::vector<std::int64_t>& frames);
+formats::ShownScene build_scene(Run& run, const RenderArguments& arguments, formats::Input& input,
+                                const std::vector<std::int64_t>& frames);
 
 } // namespace gewebe::cli

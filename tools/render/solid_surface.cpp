@@ -15,7 +15,7 @@
 #include <utility>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::cli {
 namespace {
 
 double area(const TriangleMesh& mesh, std::span<const Triangle> triangles) {
@@ -26,7 +26,7 @@ double area(const TriangleMesh& mesh, std::span<const Triangle> triangles) {
 }
 
 /// Gives the triangles of the cut points of their own, in place of those that others use too.
-void part_cut(TetClip& clip) {
+void part_cut(tetrahedra::TetClip& clip) {
   TriangleMesh& mesh = clip.mesh;
   std::vector<std::uint32_t> own(mesh.points.size());
   std::iota(own.begin(), own.end(), 0U);
@@ -49,15 +49,16 @@ void part_cut(TetClip& clip) {
 
 } // namespace
 
-void examine_solid(const TetMesh& mesh, SolidReport& report) {
-  const TetReport found = examine_tetrahedra(mesh);
-  require_sound(found);
+void examine_solid(const tetrahedra::TetMesh& mesh, SolidReport& report) {
+  const tetrahedra::TetReport found = tetrahedra::examine_tetrahedra(mesh);
+  tetrahedra::require_sound(found);
   report.tetrahedra += found.tetrahedra;
   report.curved_edges += found.curved_edges.count;
 }
 
-TetClip cut_open(const TetMesh& mesh, const ClipPlane& plane, SolidReport& report) {
-  TetClip left = clip_tetrahedra(mesh, plane);
+tetrahedra::TetClip cut_open(const tetrahedra::TetMesh& mesh, const tetrahedra::ClipPlane& plane,
+                             SolidReport& report) {
+  tetrahedra::TetClip left = tetrahedra::clip_tetrahedra(mesh, plane);
   const auto cut = std::span(left.mesh.triangles).subspan(left.cut_begin);
   report.tetrahedra_cut += left.tetrahedra_cut;
   report.tetrahedra_removed += left.tetrahedra_removed;
@@ -67,31 +68,31 @@ TetClip cut_open(const TetMesh& mesh, const ClipPlane& plane, SolidReport& repor
   return left;
 }
 
-TriangleMesh open_mesh(const TetMesh& mesh, const ClipPlane& plane, SolidReport& report) {
-  TetClip left = cut_open(mesh, plane, report);
+TriangleMesh open_mesh(const tetrahedra::TetMesh& mesh, const tetrahedra::ClipPlane& plane,
+                       SolidReport& report) {
+  tetrahedra::TetClip left = cut_open(mesh, plane, report);
   if (left.mesh.triangles.empty())
     throw Error(takes_all_away);
   return std::move(left.mesh);
 }
 
-Surface read_solid(Input& input, const SurfaceReadOptions& options, SolidReport& report,
-                   const Context& context) {
+shading::Surface read_solid(formats::Input& input, const SurfaceReadOptions& options,
+                            SolidReport& report, const Context& context) {
   report = {};
-  TetReadOptions reading;
+  formats::TetReadOptions reading;
   reading.kind = options.kind;
   reading.max_memory = context.max_memory;
   if (!options.unit.empty())
-    reading.scale = millimetres_per(options.unit);
-  const TetMesh mesh = read_tet_mesh(input, reading);
+    reading.scale = formats::millimetres_per(options.unit);
+  const tetrahedra::TetMesh mesh = formats::read_tet_mesh(input, reading);
   return at(input.name(), [&] {
     examine_solid(mesh, report);
-    Surface surface;
-    surface.mesh = options.clip ? open_mesh(mesh, *options.clip, report) : boundary(mesh).mesh;
+    shading::Surface surface;
+    surface.mesh =
+        options.clip ? open_mesh(mesh, *options.clip, report) : tetrahedra::boundary(mesh).mesh;
     return surface;
   });
 }
-
-namespace cli {
 
 void tell_solid(Run& run, const std::string& name, const SurfaceReadOptions& options,
                 const SolidReport& report) {
@@ -111,5 +112,4 @@ void tell_solid(Run& run, const std::string& name, const SurfaceReadOptions& opt
     run.warn(name + ": --clip takes nothing away");
 }
 
-} // namespace cli
-} // namespace gewebe
+} // namespace gewebe::cli

@@ -14,16 +14,17 @@
 #include <charconv>
 #include <utility>
 
-namespace gewebe {
+namespace gewebe::cli {
 namespace {
 
-std::vector<Surface> one(TriangleMesh mesh) {
-  std::vector<Surface> surfaces(1);
+std::vector<shading::Surface> one(TriangleMesh mesh) {
+  std::vector<shading::Surface> surfaces(1);
   surfaces[0].mesh = std::move(mesh);
   return surfaces;
 }
 
-std::int64_t whole_number(const Input& input, const std::string& word, const std::string& part) {
+std::int64_t whole_number(const formats::Input& input, const std::string& word,
+                          const std::string& part) {
   std::int64_t value = 0;
   const auto [rest, status] = std::from_chars(part.data(), part.data() + part.size(), value);
   if (status != std::errc{} || rest != part.data() + part.size())
@@ -34,23 +35,25 @@ std::int64_t whole_number(const Input& input, const std::string& word, const std
 constexpr const char* no_tetrahedra =
     "--clip for what has no tetrahedra, expected a tetrahedral mesh (mc-opt --tets makes one)";
 
-TriangleMesh open_model(const Model& model, const ClipPlane& plane, SolidReport& report) {
-  TetMesh mesh = element_mesh(model);
+TriangleMesh open_model(const model::Model& model, const tetrahedra::ClipPlane& plane,
+                        SolidReport& report) {
+  tetrahedra::TetMesh mesh = fem::element_mesh(model);
   examine_solid(mesh, report);
-  return open_mesh(linear_parts(std::move(mesh)), plane, report);
+  return open_mesh(tetrahedra::linear_parts(std::move(mesh)), plane, report);
 }
 
-void refuse(bool wrong, const Input& input, const char* what) {
+void refuse(bool wrong, const formats::Input& input, const char* what) {
   if (wrong)
     throw UsageError(input.name(), what);
 }
 
 } // namespace
 
-std::vector<std::int64_t> result_frames(const Input& input, const std::string& word) {
+std::vector<std::int64_t> result_frames(const formats::Input& input, const std::string& word) {
   if (input.name() == "-")
     throw Error(input.name(), "a result comes by a pipe, expected the name of its file");
-  const auto count = static_cast<std::int64_t>(read_result_index(input.name()).times.size());
+  const auto count =
+      static_cast<std::int64_t>(formats::read_result_index(input.name()).times.size());
   std::vector<std::int64_t> parts;
   if (word == "all")
     parts = {0, -1};
@@ -78,31 +81,33 @@ std::vector<std::int64_t> result_frames(const Input& input, const std::string& w
   }
 }
 
-const std::vector<Kind>& readable_surface_kinds() {
-  static const std::vector<Kind> kinds = [] {
-    std::vector<Kind> all = readable_mesh_kinds();
-    for (const Kind kind : readable_tet_kinds())
+const std::vector<formats::Kind>& readable_surface_kinds() {
+  static const std::vector<formats::Kind> kinds = [] {
+    std::vector<formats::Kind> all = formats::readable_mesh_kinds();
+    for (const formats::Kind kind : formats::readable_tet_kinds())
       if (std::ranges::find(all, kind) == all.end()) // PLY is both
         all.push_back(kind);
-    all.push_back(Kind::ela);
-    all.push_back(Kind::hdf5);
+    all.push_back(formats::Kind::ela);
+    all.push_back(formats::Kind::hdf5);
     return all;
   }();
   return kinds;
 }
 
 const std::vector<std::string>& surface_unit_names() {
-  return mesh_unit_names();
+  return formats::mesh_unit_names();
 }
 
-std::vector<Surface> read_surfaces(Input& input, const SurfaceReadOptions& options,
-                                   const Context& context, SolidReport* solid) {
-  const bool is_result = options.kind == Kind::hdf5, is_model = options.kind == Kind::ela;
+std::vector<shading::Surface> read_surfaces(formats::Input& input,
+                                            const SurfaceReadOptions& options,
+                                            const Context& context, SolidReport* solid) {
+  const bool is_result = options.kind == formats::Kind::hdf5,
+             is_model = options.kind == formats::Kind::ela;
   refuse(!is_result && (!options.object.empty() || options.frame), input,
          "--object or --frame for no result of a run, expected neither");
   refuse((is_result || is_model) && !options.unit.empty(), input,
          "--unit for what is in mm, expected no --unit");
-  const bool is_solid = holds_tetrahedra(input.peek(4096), options.kind);
+  const bool is_solid = formats::holds_tetrahedra(input.peek(4096), options.kind);
   refuse(!is_solid && !is_result && !is_model && options.clip, input, no_tetrahedra);
   refuse(!is_result && !options.field.empty(), input,
          "--field for no result of a run, expected no --field");
@@ -110,27 +115,27 @@ std::vector<Surface> read_surfaces(Input& input, const SurfaceReadOptions& optio
   SolidReport& report = solid == nullptr ? unused : *solid;
   report = {};
   if (is_solid) {
-    std::vector<Surface> surfaces;
+    std::vector<shading::Surface> surfaces;
     surfaces.push_back(read_solid(input, options, report, context));
     return surfaces;
   }
   if (is_result)
     return read_result_surfaces(input, options, report);
   if (is_model) {
-    const Model model = read_ela(input, context);
+    const model::Model model = formats::read_ela(input, context);
     refuse(model.tetrahedra.empty() && options.clip, input, no_tetrahedra);
-    std::vector<Surface> surfaces = one(
+    std::vector<shading::Surface> surfaces = one(
         options.clip ? at(input.name(), [&] { return open_model(model, *options.clip, report); })
-                     : shown_mesh(model));
-    for (const Material& material : model.materials)
+                     : model::shown_mesh(model));
+    for (const model::Material& material : model.materials)
       surfaces[0].materials.push_back(material.name);
     return surfaces;
   }
-  MeshReadOptions reading;
+  formats::MeshReadOptions reading;
   reading.kind = options.kind;
   reading.unit = options.unit;
   reading.max_memory = context.max_memory;
-  return one(read_mesh(input, reading));
+  return one(formats::read_mesh(input, reading));
 }
 
-} // namespace gewebe
+} // namespace gewebe::cli

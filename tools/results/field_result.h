@@ -8,7 +8,7 @@
 #include <memory>
 #include <string>
 
-namespace gewebe {
+namespace gewebe::cli {
 
 struct FieldOptions {
   std::string like;     ///< the image whose voxels it has
@@ -19,9 +19,9 @@ struct FieldOptions {
 
 /// Reads the image's header. Objects are solids. \throw Error, UsageError as Output, if the image
 /// is none or too large, and later (place: the object's name) for an object without tetrahedra
-std::unique_ptr<ResultWriter> open_field_result(const std::string& path,
-                                                const Output::Options& output,
-                                                const FieldOptions& options,
-                                                const Context& context);
+std::unique_ptr<formats::ResultWriter> open_field_result(const std::string& path,
+                                                         const formats::Output::Options& output,
+                                                         const FieldOptions& options,
+                                                         const Context& context);
 
-} // namespace gewebe
+} // namespace gewebe::cli

@@ -6,12 +6,12 @@
 #include <limits>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::cli {
 namespace {
 
-std::vector<Kind> kinds_written() {
-  std::vector<Kind> kinds = result_kinds();
-  kinds.push_back(Kind::nifti);
+std::vector<formats::Kind> kinds_written() {
+  std::vector<formats::Kind> kinds = formats::result_kinds();
+  kinds.push_back(formats::Kind::nifti);
   return kinds;
 }
 
@@ -41,28 +41,30 @@ void ResultChoice::check(const cli::Program& program) const {
       throw UsageError(option + " without --field, expected both");
 }
 
-Kind ResultChoice::kind(const cli::Run& run) const {
+formats::Kind ResultChoice::kind(const cli::Run& run) const {
   const bool none = run.output() == "-" && run.to().empty();
-  const Kind kind =
-      none ? Kind::unknown : output_kind(run.to(), run.output(), Kind::hdf5, kinds_written());
-  if ((kind == Kind::nifti) == field_.empty())
+  const formats::Kind kind =
+      none ? formats::Kind::unknown
+           : formats::output_kind(run.to(), run.output(), formats::Kind::hdf5, kinds_written());
+  if ((kind == formats::Kind::nifti) == field_.empty())
     throw UsageError(field_.empty()
                          ? "nii is a displacement field, expected --field IMAGE"
                          : "--field is for a result of kind nii, expected -o FILE.nii.gz");
-  if ((kind == Kind::hdf5 || kind == Kind::vtkhdf) && run.output() == "-")
-    throw UsageError(std::string(kind_name(kind)) +
+  if ((kind == formats::Kind::hdf5 || kind == formats::Kind::vtkhdf) && run.output() == "-")
+    throw UsageError(std::string(formats::kind_name(kind)) +
                      " can't go to standard output, expected -o FILE");
-  if (rows_given_() && kind != Kind::csv)
+  if (rows_given_() && kind != formats::Kind::csv)
     throw UsageError("--rows is for a result of kind csv, expected -o FILE.csv or --to csv");
   return kind;
 }
 
-std::unique_ptr<ResultWriter> ResultChoice::open(cli::Run& run, Kind kind) const {
-  if (kind == Kind::unknown)
+std::unique_ptr<formats::ResultWriter> ResultChoice::open(cli::Run& run, formats::Kind kind) const {
+  if (kind == formats::Kind::unknown)
     return nullptr;
-  if (kind != Kind::nifti)
-    return open_result(kind, run.output(), run.output_options(is_binary(kind)),
-                       rows_ == "node" ? TableRows::node : TableRows::frame);
+  if (kind != formats::Kind::nifti)
+    return formats::open_result(kind, run.output(), run.output_options(formats::is_binary(kind)),
+                                rows_ == "node" ? formats::TableRows::node
+                                                : formats::TableRows::frame);
   FieldOptions options;
   options.like = field_;
   options.at_rest = field_at_ == "rest";
@@ -71,4 +73,4 @@ std::unique_ptr<ResultWriter> ResultChoice::open(cli::Run& run, Kind kind) const
   return open_field_result(run.output(), run.output_options(true), options, run.context());
 }
 
-} // namespace gewebe
+} // namespace gewebe::cli

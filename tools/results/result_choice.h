@@ -9,7 +9,7 @@
 #include <memory>
 #include <string>
 
-namespace gewebe {
+namespace gewebe::cli {
 
 class ResultChoice {
 public:
@@ -19,13 +19,13 @@ public:
   void check(const cli::Program& program) const;
   /// The kind of result, or unknown where there is none but replies. \throw UsageError if that and
   /// the options differ
-  Kind kind(const cli::Run& run) const;
+  formats::Kind kind(const cli::Run& run) const;
   /// Nothing where the kind is unknown. `run` outlives it. \throw as open_result, open_field_result
-  std::unique_ptr<ResultWriter> open(cli::Run& run, Kind kind) const;
+  std::unique_ptr<formats::ResultWriter> open(cli::Run& run, formats::Kind kind) const;
 
 private:
   std::string field_, field_at_ = "deformed", field_outside_ = "zero", rows_ = "frame";
   std::function<bool()> rows_given_;
 };
 
-} // namespace gewebe
+} // namespace gewebe::cli

@@ -10,55 +10,57 @@
 #include <numeric>
 #include <span>
 
-namespace gewebe {
+namespace gewebe::cli {
 
 namespace {
 
 /// Whether small strains of tetrahedra alone give the object's shape.
-bool can_estimate(const ObjectFacts& object, const Model& model) {
-  return object.method == Method::ffe && !object.element_frames && !object.warp && !object.staged &&
-         !model.tetrahedra.empty() && model.springs.empty();
+bool can_estimate(const scene::ObjectFacts& object, const model::Model& model) {
+  return object.method == scene::Method::ffe && !object.element_frames && !object.warp &&
+         !object.staged && !model.tetrahedra.empty() && model.springs.empty();
 }
 
 /// Nodes that are displaced or touched: they stand where they must.
-std::vector<std::uint8_t> led_nodes(std::span<const NodeVector> forces, std::size_t nodes) {
+std::vector<std::uint8_t> led_nodes(std::span<const contact::NodeVector> forces,
+                                    std::size_t nodes) {
   std::vector<std::uint8_t> led(nodes);
-  for (const NodeVector& f : forces)
+  for (const contact::NodeVector& f : forces)
     led[f.node] = 1;
   return led;
 }
 
 } // namespace
 
-std::vector<EstimateAnswer> SceneEstimates::find(const Simulation& simulation,
-                                                 const Vec3& gravity) {
-  std::vector<EstimateAnswer> answers;
+std::vector<formats::EstimateAnswer> SceneEstimates::find(const scene::Simulation& simulation,
+                                                          const Vec3& gravity) {
+  std::vector<formats::EstimateAnswer> answers;
   for (std::size_t i = 0; i < simulation.object_count(); ++i) {
-    const ObjectFacts facts = simulation.object(i);
-    EstimateAnswer& answer = answers.emplace_back();
+    const scene::ObjectFacts facts = simulation.object(i);
+    formats::EstimateAnswer& answer = answers.emplace_back();
     answer.object = i;
     if (!facts.known || !can_estimate(facts, simulation.model(i)))
       continue;
-    if (topology_changed(simulation, i) || !solids_.contains(i)) {
+    if (formats::topology_changed(simulation, i) || !solids_.contains(i)) {
       Solid& made = solids_[i];
-      made.mesh = element_mesh(simulation.model(i));
-      made.materials = element_materials(simulation.model(i));
-      made.elements = solid_elements(made.mesh, made.materials);
+      made.mesh = fem::element_mesh(simulation.model(i));
+      made.materials = fem::element_materials(simulation.model(i));
+      made.elements = fem::solid_elements(made.mesh, made.materials);
     }
     const Solid& solid = solids_[i];
     const std::span<const double> u = simulation.displacement(i);
-    const std::vector<CornerTensors> stresses = solid_stresses(
-        solid.elements, solid_strains(solid.mesh, solid.materials, solid.elements, u, gravity));
-    const StressError error = stress_error(solid.mesh, solid.elements, stresses);
+    const std::vector<fem::CornerTensors> stresses =
+        fem::solid_stresses(solid.elements, fem::solid_strains(solid.mesh, solid.materials,
+                                                               solid.elements, u, gravity));
+    const fem::StressError error = fem::stress_error(solid.mesh, solid.elements, stresses);
     std::vector<double> held(u.size());
-    multiply_solid(solid.mesh, solid.elements, u, held);
+    fem::multiply_solid(solid.mesh, solid.elements, u, held);
     const double energy = std::inner_product(u.begin(), u.end(), held.begin(), 0.0);
-    DiscretisationError& found = answer.error.emplace();
+    fem::DiscretisationError& found = answer.error.emplace();
     if (!(energy > 0))
       continue; // nothing is deformed
     found.relative = std::accumulate(error.energy.begin(), error.energy.end(), 0.0) / energy;
     Vec3 force;
-    for (const NodeVector& f : simulation.contact_forces(i))
+    for (const contact::NodeVector& f : simulation.contact_forces(i))
       force += f.value;
     found.force = found.relative * norm(force);
     const std::vector<std::uint8_t> led =
@@ -68,11 +70,11 @@ std::vector<EstimateAnswer> SceneEstimates::find(const Simulation& simulation,
       if (led[node] == 0)
         farthest = std::max(farthest, norm(vector_at(u, node)));
     found.displacement = found.relative * farthest;
-    const std::vector<SymmetricBlock> at_nodes =
-        nodal_tensors(solid.mesh, solid.elements, stresses);
+    const std::vector<linalg::SymmetricBlock> at_nodes =
+        fem::nodal_tensors(solid.mesh, solid.elements, stresses);
     double largest = -1;
     for (std::size_t node = 0; node < at_nodes.size(); ++node)
-      if (const double size = von_mises(at_nodes[node]); size > largest) {
+      if (const double size = fem::von_mises(at_nodes[node]); size > largest) {
         largest = size;
         found.stress = error.at_node[node];
       }
@@ -80,4 +82,4 @@ std::vector<EstimateAnswer> SceneEstimates::find(const Simulation& simulation,
   return answers;
 }
 
-} // namespace gewebe
+} // namespace gewebe::cli

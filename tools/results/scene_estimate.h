@@ -12,22 +12,23 @@
 #include <map>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::cli {
 
 /// Keeps the elements of each solid between steps.
 class SceneEstimates {
 public:
   /// Estimates the errors of all objects after a step whose news were not taken yet.
   /// \param gravity  mm/s²  \throw Error as Simulation::displacement
-  std::vector<EstimateAnswer> find(const Simulation& simulation, const Vec3& gravity);
+  std::vector<formats::EstimateAnswer> find(const scene::Simulation& simulation,
+                                            const Vec3& gravity);
 
 private:
   struct Solid {
-    TetMesh mesh;
-    std::vector<SolidMaterial> materials;
-    std::vector<SolidElement> elements;
+    tetrahedra::TetMesh mesh;
+    std::vector<fem::SolidMaterial> materials;
+    std::vector<fem::SolidElement> elements;
   };
   std::map<std::size_t, Solid> solids_; ///< by object
 };
 
-} // namespace gewebe
+} // namespace gewebe::cli

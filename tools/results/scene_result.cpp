@@ -7,7 +7,7 @@
 #include <span>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::cli {
 
 namespace {
 
@@ -22,18 +22,18 @@ double largest_norm(std::span<const double> u) {
 
 } // namespace
 
-void SceneResult::need_models(const Simulation& simulation, std::size_t objects) const {
+void SceneResult::need_models(const scene::Simulation& simulation, std::size_t objects) const {
   for (std::size_t i = 0; writer_.wants_models() && i < objects; ++i)
     (void)simulation.first_model(i);
 }
 
-void SceneResult::add_objects(const Simulation& simulation, std::size_t objects) {
-  static const Model none;
+void SceneResult::add_objects(const scene::Simulation& simulation, std::size_t objects) {
+  static const model::Model none;
   for (; objects_ < objects; ++objects_) {
-    const Model& model = writer_.wants_models() ? simulation.first_model(objects_) : none;
-    const std::vector<Cutting>& cuttings = simulation.news().cuttings;
-    const bool part = std::any_of(cuttings.begin(), cuttings.end(), [&](const Cutting& c) {
-      return c.kind == Cutting::Kind::part && c.part == objects_;
+    const model::Model& model = writer_.wants_models() ? simulation.first_model(objects_) : none;
+    const std::vector<scene::Cutting>& cuttings = simulation.news().cuttings;
+    const bool part = std::any_of(cuttings.begin(), cuttings.end(), [&](const scene::Cutting& c) {
+      return c.kind == scene::Cutting::Kind::part && c.part == objects_;
     });
     deliver([&] {
       if (part)
@@ -45,12 +45,12 @@ void SceneResult::add_objects(const Simulation& simulation, std::size_t objects)
 }
 
 /// Those that were cut since the last frame.
-void SceneResult::change_objects(const Simulation& simulation) {
+void SceneResult::change_objects(const scene::Simulation& simulation) {
   if (!writer_.wants_models())
     return;
   std::set<std::size_t> changed;
-  for (const Cutting& c : simulation.news().cuttings)
-    if (c.kind == Cutting::Kind::cut || c.kind == Cutting::Kind::restored)
+  for (const scene::Cutting& c : simulation.news().cuttings)
+    if (c.kind == scene::Cutting::Kind::cut || c.kind == scene::Cutting::Kind::restored)
       changed.insert(c.object);
   for (const std::size_t object : changed)
     deliver([&] {
@@ -59,12 +59,12 @@ void SceneResult::change_objects(const Simulation& simulation) {
     });
 }
 
-void SceneResult::first_frame(const Simulation& simulation, std::size_t objects) {
+void SceneResult::first_frame(const scene::Simulation& simulation, std::size_t objects) {
   add_objects(simulation, objects);
   if (frames_ > 0)
     return;
   std::vector<std::vector<double>> rest;
-  std::vector<FrameObject> frame;
+  std::vector<formats::FrameObject> frame;
   for (std::size_t i = 0; i < objects; ++i)
     rest.emplace_back(simulation.object(i).known ? 3 * simulation.first_model(i).nodes.size() : 0);
   for (std::size_t i = 0; i < objects; ++i)
@@ -73,35 +73,36 @@ void SceneResult::first_frame(const Simulation& simulation, std::size_t objects)
   ++frames_;
 }
 
-void SceneResult::set_instruments(const Simulation& simulation) {
-  std::vector<InstrumentReport> reports;
+void SceneResult::set_instruments(const scene::Simulation& simulation) {
+  std::vector<scene::InstrumentReport> reports;
   for (std::size_t k = 0; k < simulation.instrument_count(); ++k)
     reports.push_back(simulation.instrument(k));
-  std::vector<FrameInstrument> instruments;
-  for (const InstrumentReport& r : reports)
+  std::vector<formats::FrameInstrument> instruments;
+  for (const scene::InstrumentReport& r : reports)
     instruments.push_back({r.name, r.present, r.shape, r.pose, r.hand.value_or(r.pose.place),
                            r.force, r.torque, r.nodes});
   deliver([&] { writer_.set_instruments(instruments); });
 }
 
-void SceneResult::set_attachments(const Simulation& simulation) {
-  std::vector<FrameAttachment> attachments;
-  for (const AttachmentReport& a : simulation.attachments())
+void SceneResult::set_attachments(const scene::Simulation& simulation) {
+  std::vector<formats::FrameAttachment> attachments;
+  for (const scene::AttachmentReport& a : simulation.attachments())
     attachments.push_back(
         {simulation.object(a.object).name, simulation.object(a.other).name, a.springs, a.force});
   deliver([&] { writer_.set_attachments(attachments); });
 }
 
-void SceneResult::frame(const Simulation& simulation, std::span<const EstimateAnswer> estimates) {
+void SceneResult::frame(const scene::Simulation& simulation,
+                        std::span<const formats::EstimateAnswer> estimates) {
   add_objects(simulation, simulation.object_count());
   change_objects(simulation);
   set_instruments(simulation);
   const bool curves = writer_.wants_curves();
   if (curves)
     set_attachments(simulation);
-  std::vector<FrameObject> frame;
+  std::vector<formats::FrameObject> frame;
   for (std::size_t i = 0; i < simulation.object_count(); ++i) {
-    FrameObject& object = frame.emplace_back();
+    formats::FrameObject& object = frame.emplace_back();
     if (writer_.wants_models())
       object.displacement = simulation.displacement(i);
     object.forces = simulation.contact_forces(i);
@@ -115,4 +116,4 @@ void SceneResult::frame(const Simulation& simulation, std::span<const EstimateAn
   ++frames_;
 }
 
-} // namespace gewebe
+} // namespace gewebe::cli

@@ -6,20 +6,20 @@
 
 #include <span>
 
-namespace gewebe {
+namespace gewebe::cli {
 
-void SceneShapes::need_models(const Simulation& simulation, std::size_t objects) {
+void SceneShapes::need_models(const scene::Simulation& simulation, std::size_t objects) {
   for (std::size_t i = 0; i < objects; ++i)
     (void)simulation.model(i);
 }
 
-void SceneShapes::frame(const Simulation& simulation, std::uint64_t step) {
+void SceneShapes::frame(const scene::Simulation& simulation, std::uint64_t step) {
   const std::size_t objects = simulation.object_count();
   positions_.resize(objects);
-  std::vector<SharedShape> shapes;
+  std::vector<formats::SharedShape> shapes;
   bool changed = false;
   for (std::size_t i = 0; i < objects; ++i) {
-    const std::vector<Node>& nodes = simulation.model(i).nodes;
+    const std::vector<model::Node>& nodes = simulation.model(i).nodes;
     const std::span<const double> u = simulation.displacement(i);
     std::vector<double>& positions = positions_[i];
     positions.clear();
@@ -28,9 +28,9 @@ void SceneShapes::frame(const Simulation& simulation, std::uint64_t step) {
       positions.insert(positions.end(), {p.x, p.y, p.z});
     }
     shapes.push_back({simulation.object(i).name, positions});
-    changed = changed || topology_changed(simulation, i);
+    changed = changed || formats::topology_changed(simulation, i);
   }
   deliver([&] { file_.write(step, simulation.time(), shapes, changed); });
 }
 
-} // namespace gewebe
+} // namespace gewebe::cli

@@ -8,22 +8,22 @@
 #include <cstdint>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::cli {
 
 /// What the file throws leaves as Undelivered, what the simulation throws as it is.
 class SceneShapes {
 public:
-  explicit SceneShapes(SharedShapes& file) : file_(file) {} ///< keeps a reference
+  explicit SceneShapes(formats::SharedShapes& file) : file_(file) {} ///< keeps a reference
 
   /// Reads the models of the first objects; all of them have a shape.
-  static void need_models(const Simulation& simulation, std::size_t objects);
+  static void need_models(const scene::Simulation& simulation, std::size_t objects);
   /// Behind a step, whose news were not taken yet: where all nodes of all objects stand.
   /// \pre shapes were made within the step
-  void frame(const Simulation& simulation, std::uint64_t step);
+  void frame(const scene::Simulation& simulation, std::uint64_t step);
 
 private:
-  SharedShapes& file_;
+  formats::SharedShapes& file_;
   std::vector<std::vector<double>> positions_; ///< by object
 };
 
-} // namespace gewebe
+} // namespace gewebe::cli

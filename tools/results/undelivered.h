@@ -5,7 +5,7 @@
 
 #include <exception>
 
-namespace gewebe {
+namespace gewebe::cli {
 
 /// A failure of what takes answers, results and logs is no fault of the line.
 struct Undelivered {
@@ -21,4 +21,4 @@ void deliver(Work&& work) {
   }
 }
 
-} // namespace gewebe
+} // namespace gewebe::cli

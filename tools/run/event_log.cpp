@@ -4,7 +4,7 @@
 
 #include <initializer_list>
 
-namespace gewebe {
+namespace gewebe::cli {
 
 namespace {
 
@@ -15,26 +15,26 @@ std::string quoted(std::string_view text) {
   return result + '"';
 }
 
-std::string csv(double time, const ChangeRow& row) {
-  std::string line = number_text(time) + "," + row.what + "," + row.object + "," +
+std::string csv(double time, const scene::ChangeRow& row) {
+  std::string line = text::number_text(time) + "," + row.what + "," + row.object + "," +
                      node_ranges(row.nodes, ' ') + ",";
   for (int a = 0; a < 3; ++a)
-    line += (row.vector ? number_text((*row.vector)[a]) : "") + ",";
-  line += (row.value ? number_text(*row.value) : "") + ",";
-  line += (row.duration > 0 ? number_text(row.duration) : "") + "," + row.other + "," +
+    line += (row.vector ? text::number_text((*row.vector)[a]) : "") + ",";
+  line += (row.value ? text::number_text(*row.value) : "") + ",";
+  line += (row.duration > 0 ? text::number_text(row.duration) : "") + "," + row.other + "," +
           node_ranges(row.others, ' ') + ",";
   line += row.text.empty() ? "" : quoted(row.text);
-  const InstrumentRow& of = row.instrument;
+  const scene::InstrumentRow& of = row.instrument;
   const auto add = [&](bool there, std::initializer_list<double> values) {
     for (const double value : values)
-      line += "," + (there ? number_text(value + 0.0) : ""); // -0 as 0
+      line += "," + (there ? text::number_text(value + 0.0) : ""); // -0 as 0
   };
   const auto add_vector = [&](const std::optional<Vec3>& v) {
     const Vec3 value = v.value_or(Vec3{});
     add(v.has_value(), {value.x, value.y, value.z});
   };
   add_vector(of.end);
-  const Quaternion turn = of.turn.value_or(Quaternion{});
+  const contact::Quaternion turn = of.turn.value_or(contact::Quaternion{});
   add(of.turn.has_value(), {turn.w, turn.x, turn.y, turn.z});
   add_vector(of.force);
   add_vector(of.torque);
@@ -48,7 +48,7 @@ constexpr std::string_view columns =
     "turn_x,turn_y,turn_z,force_x,force_y,force_z,torque_x,torque_y,torque_z,touched,hand_x,hand_y,"
     "hand_z\n";
 
-Output::Options as_log(Output::Options options) {
+formats::Output::Options as_log(formats::Output::Options options) {
   options.log = columns;
   options.beside = true;
   return options;
@@ -72,15 +72,15 @@ std::string node_ranges(const std::vector<std::uint32_t>& nodes, char separator)
   return text;
 }
 
-EventLog::EventLog(const std::string& path, const Output::Options& options)
+EventLog::EventLog(const std::string& path, const formats::Output::Options& options)
     : output_(path, as_log(options)) {
   output_.write(columns);
 }
 
 void EventLog::object(double time, const std::string& name, const std::string& model,
-                      Method method) {
-  rows_.push_back(
-      csv(time, {.what = "object", .object = name, .text = model + " " + method_name(method)}));
+                      scene::Method method) {
+  rows_.push_back(csv(
+      time, {.what = "object", .object = name, .text = model + " " + scene::method_name(method)}));
 }
 
 void EventLog::model(double time, const std::string& name, const std::string& file) {
@@ -92,28 +92,28 @@ void EventLog::stress(double time, const std::string& name,
   rows_.push_back(csv(time, {.what = "emit", .object = name, .nodes = nodes, .text = "stress"}));
 }
 
-void EventLog::change(double time, const ChangeRow& row) {
+void EventLog::change(double time, const scene::ChangeRow& row) {
   rows_.push_back(csv(time, row));
 }
 
-void EventLog::cutting(const Simulation& simulation, const Cutting& c) {
-  const bool part = c.kind == Cutting::Kind::part;
-  rows_.push_back(csv(c.time, {.what = c.kind == Cutting::Kind::cut     ? "severed"
-                                       : part                           ? "part"
-                                       : c.kind == Cutting::Kind::loose ? "loose"
-                                                                        : "restored",
+void EventLog::cutting(const scene::Simulation& simulation, const scene::Cutting& c) {
+  const bool part = c.kind == scene::Cutting::Kind::part;
+  rows_.push_back(csv(c.time, {.what = c.kind == scene::Cutting::Kind::cut     ? "severed"
+                                       : part                                  ? "part"
+                                       : c.kind == scene::Cutting::Kind::loose ? "loose"
+                                                                               : "restored",
                                .object = simulation.object(c.object).name,
                                .value = static_cast<double>(c.nodes),
                                .other = part ? simulation.object(c.part).name : "",
-                               .text = c.kind == Cutting::Kind::cut
+                               .text = c.kind == scene::Cutting::Kind::cut
                                            ? std::to_string(c.springs) + " springs, " +
                                                  std::to_string(c.doubled) + " nodes doubled"
                                            : c.text}));
 }
 
-void EventLog::instruments(const Simulation& simulation) {
+void EventLog::instruments(const scene::Simulation& simulation) {
   for (std::size_t k = 0; k < simulation.instrument_count(); ++k) {
-    const InstrumentReport report = simulation.instrument(k);
+    const scene::InstrumentReport report = simulation.instrument(k);
     if (!report.present)
       continue;
     rows_.push_back(csv(simulation.time(),
@@ -121,7 +121,7 @@ void EventLog::instruments(const Simulation& simulation) {
                          .object = report.name,
                          .vector = report.pose.place + Vec3{}, // -0 as 0
                          .value = report.shape.radius,
-                         .text = instrument_kind_name(kind_of(report.shape)),
+                         .text = contact::instrument_kind_name(contact::kind_of(report.shape)),
                          .instrument = {report.pose(report.shape.axis), report.pose.turn,
                                         report.force, report.torque, report.nodes, report.hand}}));
   }
@@ -143,4 +143,4 @@ void EventLog::commit() {
   output_.commit();
 }
 
-} // namespace gewebe
+} // namespace gewebe::cli

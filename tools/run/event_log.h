@@ -9,24 +9,24 @@
 #include <string_view>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::cli {
 
 class EventLog {
 public:
   /// \throw Error, UsageError as Output
-  EventLog(const std::string& path, const Output::Options& options);
+  EventLog(const std::string& path, const formats::Output::Options& options);
 
   /// A new object, of this model file.
-  void object(double time, const std::string& name, const std::string& model, Method method);
+  void object(double time, const std::string& name, const std::string& model, scene::Method method);
   /// An object's model was written to this file.
   void model(double time, const std::string& name, const std::string& file);
   /// Its stress at some nodes is emitted from now on.
   void stress(double time, const std::string& name, const std::vector<std::uint32_t>& nodes);
-  void change(double time, const ChangeRow& row);
+  void change(double time, const scene::ChangeRow& row);
   /// What cutting did to an object.
-  void cutting(const Simulation& simulation, const Cutting& cutting);
+  void cutting(const scene::Simulation& simulation, const scene::Cutting& cutting);
   /// Where each instrument that is there stands at the end of a step, and what it feels.
-  void instruments(const Simulation& simulation);
+  void instruments(const scene::Simulation& simulation);
   /// `what` is "error" or "warning".
   void message(double time, const char* what, std::string_view text);
 
@@ -39,11 +39,11 @@ public:
   void commit();
 
 private:
-  Output output_;
+  formats::Output output_;
   std::vector<std::string> rows_;
 };
 
 /// Ascending node numbers as ranges: "4 6-9".
 std::string node_ranges(const std::vector<std::uint32_t>& nodes, char separator);
 
-} // namespace gewebe
+} // namespace gewebe::cli

@@ -7,7 +7,7 @@
 #include <csignal>
 #include <string>
 
-namespace gewebe {
+namespace gewebe::cli {
 
 bool RunLogs::any() const {
   return events_ != nullptr || record_ != nullptr || latency_.logs();
@@ -24,7 +24,7 @@ std::optional<Error> RunLogs::commit() {
   const auto each = [&](const auto& work) {
     try {
       work();
-    } catch (const Error& error) {
+    } catch (const gewebe::Error& error) {
       if (!first)
         first = error;
     }
@@ -40,8 +40,8 @@ std::optional<Error> RunLogs::commit() {
 namespace {
 
 /// Keeps the frames. \return what is to be said of it
-Error ending_of(const Error& error, ResultWriter* result, double time) {
-  const bool interrupted = deferred_signal() != 0;
+Error ending_of(const Error& error, formats::ResultWriter* result, double time) {
+  const bool interrupted = formats::deferred_signal() != 0;
   std::string kept, left_out;
   if (result != nullptr)
     try {
@@ -49,7 +49,7 @@ Error ending_of(const Error& error, ResultWriter* result, double time) {
         time = some->time;
         kept = some->what;
         if (!interrupted)
-          kept += (some->all_frames ? " up to " : " at ") + number_text(time) + " s";
+          kept += (some->all_frames ? " up to " : " at ") + text::number_text(time) + " s";
         kept += " kept in " + some->file;
         if (!some->left_out.empty())
           kept += " (without " + some->left_out + ")";
@@ -60,35 +60,36 @@ Error ending_of(const Error& error, ResultWriter* result, double time) {
     }
   if (!interrupted)
     return {error.place(), error.what() + (kept.empty() ? "" : "; " + kept)};
-  return Error("interrupted at " + number_text(time) + " s" + (kept.empty() ? "" : ": " + kept));
+  return Error("interrupted at " + text::number_text(time) + " s" +
+               (kept.empty() ? "" : ": " + kept));
 }
 
 } // namespace
 
-void outlive_failures(ResultWriter* result, RunLogs& logs) {
+void outlive_failures(formats::ResultWriter* result, RunLogs& logs) {
   if (result != nullptr || logs.any())
-    defer_signals();
+    formats::defer_signals();
   if (result != nullptr)
     result->outlive_signals();
   logs.outlive_signals();
 }
 
-void end_failed_run(const Error& error, ResultWriter* result, RunLogs& logs, double time) {
-  const bool unheard = deferred_signal() == SIGPIPE;
+void end_failed_run(const Error& error, formats::ResultWriter* result, RunLogs& logs, double time) {
+  const bool unheard = formats::deferred_signal() == SIGPIPE;
   if (!unheard)
     (void)logs.commit(); // they tell how it came to this
   const Error ending = ending_of(error, result, time);
   if (unheard) {
     cli::erase_progress();
-    end_by_deferred_signal();
+    formats::end_by_deferred_signal();
   }
   throw Error(ending);
 }
 
-void report_recovered(cli::Run& run, const KeptResult& kept) {
-  run.say(kept.what + " up to " + number_text(kept.time) + " s kept in " + kept.file);
+void report_recovered(cli::Run& run, const formats::KeptResult& kept) {
+  run.say(kept.what + " up to " + text::number_text(kept.time) + " s kept in " + kept.file);
   run.stats().set("recovered", kept.file);
   run.stats().set("time", kept.time);
 }
 
-} // namespace gewebe
+} // namespace gewebe::cli

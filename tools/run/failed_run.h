@@ -10,7 +10,7 @@
 
 #include <optional>
 
-namespace gewebe {
+namespace gewebe::cli {
 
 /// The files beside the result.
 class RunLogs {
@@ -33,16 +33,16 @@ private:
 
 /// From now on a signal ends the run at its next check, so that frames and logs can be kept.
 /// \param result  null: no frames are to be kept
-void outlive_failures(ResultWriter* result, RunLogs& logs);
+void outlive_failures(formats::ResultWriter* result, RunLogs& logs);
 
 /// Keeps logs and, if `result` is there, frames. The error's message, or "interrupted" behind a
 /// signal, is completed by a note of the kept files. Where the reader of answers has gone
 /// (SIGPIPE), the program ends by the signal without a message, and logs stay FILE.part. \param
 /// time  of the scene, s
-[[noreturn]] void end_failed_run(const Error& error, ResultWriter* result, RunLogs& logs,
+[[noreturn]] void end_failed_run(const Error& error, formats::ResultWriter* result, RunLogs& logs,
                                  double time);
 
 /// Reports with -v and in --stats what `recover_result` found.
-void report_recovered(cli::Run& run, const KeptResult& kept);
+void report_recovered(cli::Run& run, const formats::KeptResult& kept);
 
-} // namespace gewebe
+} // namespace gewebe::cli

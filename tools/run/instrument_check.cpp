@@ -12,7 +12,7 @@
 #include <optional>
 #include <span>
 
-namespace gewebe {
+namespace gewebe::cli {
 namespace {
 
 constexpr double edges_in_radius = 2;
@@ -25,9 +25,10 @@ struct Below {
   std::vector<double> edges;  ///< between corners of elements
 };
 
-Below look_below(const Simulation& simulation, std::size_t number, const PlacedInstrument& placed) {
+Below look_below(const scene::Simulation& simulation, std::size_t number,
+                 const contact::PlacedInstrument& placed) {
   Below below{number, HUGE_VAL, {}, {}};
-  const Model& model = simulation.model(number);
+  const model::Model& model = simulation.model(number);
   const std::size_t nodes = simulation.node_counts(number).surface;
   const std::span<const double> u = simulation.known_surface(number); // else about where it rests
   std::vector<double> distance(nodes);
@@ -43,13 +44,14 @@ Below look_below(const Simulation& simulation, std::size_t number, const PlacedI
   }
   const double reach = below.distance + 2 * placed.radius;
   for (const Tetrahedron& t : model.tetrahedra)
-    for (const auto& [i, j] : tetrahedron_edges)
+    for (const auto& [i, j] : tetrahedra::tetrahedron_edges)
       if (t[i] < nodes && t[j] < nodes && (distance[t[i]] <= reach || distance[t[j]] <= reach))
         below.edges.push_back(norm(model.nodes[t[i]].position - model.nodes[t[j]].position));
   return below;
 }
 
-std::optional<Below> nearest(const Simulation& simulation, const PlacedInstrument& placed) {
+std::optional<Below> nearest(const scene::Simulation& simulation,
+                             const contact::PlacedInstrument& placed) {
   std::optional<Below> result;
   for (std::size_t n = 0; n < simulation.object_count(); ++n) {
     if (!simulation.object(n).known || simulation.model(n).tetrahedra.empty())
@@ -66,27 +68,27 @@ std::string place_text(const Vec3& place, double radius) {
   const double unit = std::ldexp(1, std::ilogb(radius / 10));
   const auto text = [&](double x) {
     const double rounded = std::round(x / unit) * unit;
-    return number_text(rounded == 0 ? 0 : rounded);
+    return text::number_text(rounded == 0 ? 0 : rounded);
   };
   return text(place.x) + "," + text(place.y) + "," + text(place.z);
 }
 
 } // namespace
 
-void InstrumentCheck::look(const Simulation& simulation,
+void InstrumentCheck::look(const scene::Simulation& simulation,
                            const std::function<void(const std::string&)>& warn) {
   done_.resize(simulation.instrument_count());
   for (std::size_t n = 0; n < done_.size(); ++n) {
     if (done_[n] || !warn)
       continue;
-    const InstrumentReport report = simulation.instrument(n);
+    const scene::InstrumentReport report = simulation.instrument(n);
     if (!report.present || report.nodes == 0)
       continue;
-    const InstrumentKind kind = kind_of(report.shape);
+    const contact::InstrumentKind kind = contact::kind_of(report.shape);
     done_[n] = true;
-    if (kind != InstrumentKind::sphere && kind != InstrumentKind::capsule)
+    if (kind != contact::InstrumentKind::sphere && kind != contact::InstrumentKind::capsule)
       continue; // a blade cuts, and the radius of a mesh rounds it alone
-    const PlacedInstrument placed(report.shape, report.pose);
+    const contact::PlacedInstrument placed(report.shape, report.pose);
     std::optional<Below> below = nearest(simulation, placed);
     if (!below || below->edges.empty())
       continue;
@@ -97,14 +99,14 @@ void InstrumentCheck::look(const Simulation& simulation,
     if (!(below->distance <= *middle) || !(radius < edges_in_radius * *middle))
       continue;
     warn(
-        "instrument " + report.name + " at " + number_text(simulation.time()) +
-        " s: its radius of " + rounded_text(radius) + " mm is below twice the edges of " +
-        rounded_text(*middle) + " mm of object " + simulation.object(below->object).name +
+        "instrument " + report.name + " at " + text::number_text(simulation.time()) +
+        " s: its radius of " + text::rounded_text(radius) + " mm is below twice the edges of " +
+        text::rounded_text(*middle) + " mm of object " + simulation.object(below->object).name +
         " under it, so that its force may be off by tens of percent, expected smaller cells there: "
         "exp2ela --solid --refine sphere:" +
-        place_text(below->at_rest, radius) + "," + rounded_text(2 * radius) + ":" +
-        rounded_text(radius / edges_in_radius));
+        place_text(below->at_rest, radius) + "," + text::rounded_text(2 * radius) + ":" +
+        text::rounded_text(radius / edges_in_radius));
   }
 }
 
-} // namespace gewebe
+} // namespace gewebe::cli

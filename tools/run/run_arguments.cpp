@@ -4,7 +4,7 @@
 
 #include <utility>
 
-namespace gewebe {
+namespace gewebe::cli {
 
 void RunArguments::declare(cli::Program& p) {
   result.declare(p);
@@ -40,4 +40,4 @@ void RunArguments::declare(cli::Program& p) {
   });
 }
 
-} // namespace gewebe
+} // namespace gewebe::cli

@@ -7,7 +7,7 @@
 #include <optional>
 #include <string>
 
-namespace gewebe {
+namespace gewebe::cli {
 
 struct RunArguments {
   std::string scene = "-";
@@ -22,4 +22,4 @@ struct RunArguments {
   void declare(cli::Program& p);
 };
 
-} // namespace gewebe
+} // namespace gewebe::cli

@@ -8,13 +8,13 @@
 #include <cstdint>
 #include <string>
 
-namespace gewebe {
+namespace gewebe::cli {
 
 void report_scene(cli::Run& run, const SceneRun& scene, const StepLatency& latency,
                   const SceneReport& report) {
   const SceneCounts counts = scene.counts();
-  const SimulationCounts steps = scene.simulation().counts();
-  const ElastostaticCounts& statics = steps.elastostatic;
+  const scene::SimulationCounts steps = scene.simulation().counts();
+  const statics::ElastostaticCounts& statics = steps.elastostatic;
   cli::Stats& stats = run.stats();
   stats.set("commands", counts.commands);
   stats.set("errors", counts.errors);
@@ -31,7 +31,7 @@ void report_scene(cli::Run& run, const SceneRun& scene, const StepLatency& laten
   stats.set("sleeping_share",
             advances == 0 ? 0.0
                           : static_cast<double>(steps.resting) / static_cast<double>(advances));
-  const SimulationState state = scene.simulation().state();
+  const scene::SimulationState state = scene.simulation().state();
   stats.set("kinetic_energy", state.kinetic_energy);
   stats.set("elastic_energy", state.elastic_energy);
   stats.set("largest_strain", state.strain);
@@ -56,7 +56,7 @@ void report_scene(cli::Run& run, const SceneRun& scene, const StepLatency& laten
     stats.set("warp_change", statics.change);
   }
   if (steps.solids.steps > 0) {
-    const SolidStepCounts& solids = steps.solids;
+    const dynamics::SolidStepCounts& solids = steps.solids;
     stats.set("solid_steps", solids.steps);
     stats.set("solid_rounds", solids.rounds);
     stats.set("solid_factors", solids.factors);
@@ -99,21 +99,22 @@ void report_scene(cli::Run& run, const SceneRun& scene, const StepLatency& laten
     stats.seconds("real_time_factor", scene.simulation().time() / latency.sum());
 }
 
-void require_verified(const ElastostaticCounts& errors, double tolerance) {
+void require_verified(const statics::ElastostaticCounts& errors, double tolerance) {
   const auto require = [](const char* what, bool good, double error, double max,
                           const std::string& because) {
     if (!good)
-      throw Error(std::string("the ") + what + " of a shape is " + number_text(error) +
-                  ", expected at most " + number_text(max) + because);
+      throw Error(std::string("the ") + what + " of a shape is " + text::number_text(error) +
+                  ", expected at most " + text::number_text(max) + because);
   };
   require("error", errors.shape_error <= tolerance, errors.shape_error, tolerance, "");
-  require("last round's change", errors.change <= warp_tolerance, errors.change, warp_tolerance,
-          "");
-  const ShapeError& worst = errors.worst_shape;
+  require("last round's change", errors.change <= statics::warp_tolerance, errors.change,
+          statics::warp_tolerance, "");
+  const statics::ShapeError& worst = errors.worst_shape;
   if (tolerance == 0)
     require("backward error", worst.within(), worst.error, worst.limit,
-            worst.relative > 0 ? " with columns compressed within " + number_text(worst.relative)
-                               : "");
+            worst.relative > 0
+                ? " with columns compressed within " + text::number_text(worst.relative)
+                : "");
 }
 
-} // namespace gewebe
+} // namespace gewebe::cli

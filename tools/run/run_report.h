@@ -5,7 +5,7 @@
 #include "tools/run/scene_run.h"
 #include "tools/run/step_latency.h"
 
-namespace gewebe {
+namespace gewebe::cli {
 
 struct SceneReport {
   double rate = 0;     ///< that of --rate; 0: none
@@ -16,6 +16,6 @@ void report_scene(cli::Run& run, const SceneRun& scene, const StepLatency& laten
 
 /// \throw Error unless every shape was within the tolerance, and its backward error that of a
 /// right solution. \pre errors were measured
-void require_verified(const ElastostaticCounts& errors, double tolerance);
+void require_verified(const statics::ElastostaticCounts& errors, double tolerance);
 
-} // namespace gewebe
+} // namespace gewebe::cli

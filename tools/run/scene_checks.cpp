@@ -6,7 +6,7 @@
 #include <algorithm>
 #include <cmath>
 
-namespace gewebe {
+namespace gewebe::cli {
 
 namespace {
 
@@ -22,29 +22,30 @@ double largest(std::span<const double> values) {
 }
 
 std::string percent(double share) {
-  return number_text(std::round(std::abs(share) * 100)) + " %";
+  return text::number_text(std::round(std::abs(share) * 100)) + " %";
 }
 
 } // namespace
 
-void SceneChecks::look(const Simulation& simulation, bool shapes, const Tell& warn,
+void SceneChecks::look(const scene::Simulation& simulation, bool shapes, const Tell& warn,
                        const Tell& distrust) {
-  for (const MethodJump& jump : simulation.news().jumps) {
+  for (const scene::MethodJump& jump : simulation.news().jumps) {
     Object& object = objects_[jump.object];
     const double max = largest(simulation.displacement(jump.object));
     if (object.jump || !(jump.size > max_jump * max) || !warn)
       continue;
     object.jump = true;
-    warn("object " + simulation.object(jump.object).name + " at " + number_text(simulation.time()) +
-         " s: its shape jumped by " + rounded_text(jump.size) +
-         " mm as its method changed, and its forces with it");
+    warn("object " + simulation.object(jump.object).name + " at " +
+         text::number_text(simulation.time()) + " s: its shape jumped by " +
+         text::rounded_text(jump.size) + " mm as its method changed, and its forces with it");
   }
   for (const std::size_t number : simulation.news().unfinished) {
     Object& object = objects_[number];
     if (object.unfinished || !warn)
       continue;
     object.unfinished = true;
-    warn("object " + simulation.object(number).name + " at " + number_text(simulation.time()) +
+    warn("object " + simulation.object(number).name + " at " +
+         text::number_text(simulation.time()) +
          " s: the rounds of a step ran out before its tolerance, its motion may be off by more");
   }
   for (std::size_t n = 0; n < simulation.object_count(); ++n)
@@ -52,28 +53,28 @@ void SceneChecks::look(const Simulation& simulation, bool shapes, const Tell& wa
       look_at(simulation, n, shapes, distrust);
 }
 
-void SceneChecks::look_at(const Simulation& simulation, std::size_t number, bool shapes,
+void SceneChecks::look_at(const scene::Simulation& simulation, std::size_t number, bool shapes,
                           const Tell& distrust) {
   Object& object = objects_[number];
-  const bool wanted = simulation.object(number).method == Method::ela || shapes;
+  const bool wanted = simulation.object(number).method == scene::Method::ela || shapes;
   if (!wanted || (object.turned && object.volume && object.strain))
     return;
-  const Model& model = simulation.model(number);
+  const model::Model& model = simulation.model(number);
   if (object.model != &model || object.nodes != model.nodes.size() ||
       object.triangles != model.triangles.size()) {
     object.model = &model;
     object.nodes = model.nodes.size();
     object.triangles = model.triangles.size();
-    object.check = std::make_unique<ShapeCheck>(model);
+    object.check = std::make_unique<statics::ShapeCheck>(model);
     object.looked_at = 0;
   }
   look_at_shape(simulation, number, distrust);
 }
 
-void SceneChecks::look_at_shape(const Simulation& simulation, std::size_t number,
+void SceneChecks::look_at_shape(const scene::Simulation& simulation, std::size_t number,
                                 const Tell& distrust) {
   Object& object = objects_[number];
-  const Model& model = simulation.model(number);
+  const model::Model& model = simulation.model(number);
   const bool surface = !model.tetrahedra.empty() && model.springs.empty();
   const std::span<const double> u =
       surface ? simulation.surface_displacement(number) : simulation.displacement(number);
@@ -86,9 +87,9 @@ void SceneChecks::look_at_shape(const Simulation& simulation, std::size_t number
     return;
   object.looked_at = max;
   object.not_looked = 0;
-  const ShapeFaults faults = object.check->look(model, u);
-  const std::string who =
-      "object " + simulation.object(number).name + " at " + number_text(simulation.time()) + " s: ";
+  const statics::ShapeFaults faults = object.check->look(model, u);
+  const std::string who = "object " + simulation.object(number).name + " at " +
+                          text::number_text(simulation.time()) + " s: ";
   if (faults.turned > 0 && !object.turned && distrust) {
     object.turned = true;
     distrust(who + std::to_string(faults.turned) +
@@ -101,7 +102,7 @@ void SceneChecks::look_at_shape(const Simulation& simulation, std::size_t number
              percent(faults.volume) + ", which tissue does not do");
   }
   if (!(faults.strain <= max_strain) && !object.strain && distrust &&
-      simulation.object(number).method == Method::ela) {
+      simulation.object(number).method == scene::Method::ela) {
     object.strain = true;
     distrust(who + "the edge " + std::to_string(faults.i) + "-" + std::to_string(faults.j) +
              " is strained by " + percent(faults.strain) +
@@ -109,4 +110,4 @@ void SceneChecks::look_at_shape(const Simulation& simulation, std::size_t number
   }
 }
 
-} // namespace gewebe
+} // namespace gewebe::cli

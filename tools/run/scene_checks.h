@@ -10,7 +10,7 @@
 #include <memory>
 #include <string>
 
-namespace gewebe {
+namespace gewebe::cli {
 
 /// Looks at shapes that are there anyway, and only where something moves farther than it did.
 class SceneChecks {
@@ -21,22 +21,24 @@ public:
   /// %, and edges of elastodynamic objects strained by over half. `warn` gets a change of method by
   /// which an object jumps by over a tenth of its displacement, and of solids whose steps ran out
   /// of rounds. \param shapes whether shapes of elastostatic objects are computed anyway
-  void look(const Simulation& simulation, bool shapes, const Tell& warn, const Tell& distrust);
+  void look(const scene::Simulation& simulation, bool shapes, const Tell& warn,
+            const Tell& distrust);
 
 private:
   struct Object {
-    const Model* model = nullptr; ///< that `check` is of
+    const model::Model* model = nullptr; ///< that `check` is of
     std::size_t nodes = 0, triangles = 0;
-    std::unique_ptr<ShapeCheck> check;
+    std::unique_ptr<statics::ShapeCheck> check;
     double looked_at = 0; ///< largest displacement when it was last looked at
     int not_looked = 0;
     bool turned = false, volume = false, strain = false, jump = false,
          unfinished = false; ///< reported
   };
-  void look_at(const Simulation& simulation, std::size_t number, bool shapes, const Tell& distrust);
-  void look_at_shape(const Simulation& simulation, std::size_t number, const Tell& distrust);
+  void look_at(const scene::Simulation& simulation, std::size_t number, bool shapes,
+               const Tell& distrust);
+  void look_at_shape(const scene::Simulation& simulation, std::size_t number, const Tell& distrust);
 
   std::map<std::size_t, Object> objects_;
 };
 
-} // namespace gewebe
+} // namespace gewebe::cli

@@ -11,20 +11,20 @@
 #include <utility>
 #include <variant>
 
-namespace gewebe {
+namespace gewebe::cli {
 
 namespace {
 
 constexpr double max_samples = 1e9;
 
 template <class Work>
-auto of_object(const LinePlace& line, Work&& work) {
+auto of_object(const gewebe::cli::LinePlace& line, Work&& work) {
   try {
     return work();
-  } catch (const Cancelled&) {
+  } catch (const gewebe::Cancelled&) {
     throw;
-  } catch (const Error& error) {
-    throw WrongFile{line, with_place(error)};
+  } catch (const gewebe::Error& error) {
+    throw gewebe::cli::WrongFile{line, gewebe::cli::with_place(error)};
   }
 }
 
@@ -32,7 +32,7 @@ auto of_object(const LinePlace& line, Work&& work) {
 
 template <class Step>
 void SceneRun::State::go_on(Step&& step) {
-  check_deferred_signal();
+  formats::check_deferred_signal();
   require_object();
   const std::size_t objects = simulation.object_count(); // before parts come off
   if (result)
@@ -47,32 +47,33 @@ void SceneRun::State::go_on(Step&& step) {
 
 namespace {} // namespace
 
-void SceneRun::State::add(const ObjectCommand& c) {
+void SceneRun::State::add(const formats::ObjectCommand& c) {
   if (options.files.check) {
     options.files.check(c.model);
     if (!c.store.empty())
       options.files.check(c.store);
   }
-  ObjectSource source;
+  scene::ObjectSource source;
   source.model = [this, file = c.model, at = line] {
     return of_object(at, [&] {
-      Model model = options.files.model(file);
+      model::Model model = options.files.model(file);
       ++counts.models;
       counts.nodes += model.nodes.size();
       return model;
     });
   };
-  source.stiffness = [this, file = c.store, at = line](const Model& model) {
+  source.stiffness = [this, file = c.store, at = line](const model::Model& model) {
     if (file.empty())
-      return std::shared_ptr<ComplianceSource>();
-    StoredStiffness stored = of_object(at, [&] { return options.files.store(file, model); });
+      return std::shared_ptr<compliance::ComplianceSource>();
+    compliance::StoredStiffness stored =
+        of_object(at, [&] { return options.files.store(file, model); });
     ++counts.stores;
     stored.factor = [at, factor = std::move(stored.factor)] { return of_object(at, factor); };
-    return compliance_of_store(std::move(stored));
+    return compliance::compliance_of_store(std::move(stored));
   };
   simulation.add_object(c.name, std::move(source), c.method, c.integration, c.solid);
   if (c.warp)
-    simulation.apply(SetWarp{simulation.object_count() - 1});
+    simulation.apply(scene::SetWarp{simulation.object_count() - 1});
   stores.resize(simulation.object_count()); // parts that came off have none
   stores.back() = c.store;
   models.push_back(c.model);
@@ -80,9 +81,9 @@ void SceneRun::State::add(const ObjectCommand& c) {
     options.events->object(simulation.time(), c.name, c.model, c.method);
 }
 
-void SceneRun::State::add_stage(SetTwoStep& set, const std::string& file) {
+void SceneRun::State::add_stage(scene::SetTwoStep& set, const std::string& file) {
   if (!file.empty()) {
-    set.model = std::make_shared<const Model>(options.files.model(file));
+    set.model = std::make_shared<const model::Model>(options.files.model(file));
     models.push_back(file);
     return;
   }
@@ -94,8 +95,8 @@ void SceneRun::State::add_stage(SetTwoStep& set, const std::string& file) {
   set.second = options.files.second_stage(stores[set.object], simulation.model(set.object));
 }
 
-void SceneRun::State::write(const EmitModelCommand& c) {
-  const std::size_t object = find_object(simulation, c.object);
+void SceneRun::State::write(const formats::EmitModelCommand& c) {
+  const std::size_t object = scene::find_object(simulation, c.object);
   if (!options.files.write_model)
     throw Error("models can't be written here");
   if (std::find(models.begin(), models.end(), c.file) != models.end())
@@ -105,7 +106,7 @@ void SceneRun::State::write(const EmitModelCommand& c) {
     options.events->model(simulation.time(), c.object, c.file);
 }
 
-void SceneRun::State::tell_stress(const EmitStressCommand& c) {
+void SceneRun::State::tell_stress(const formats::EmitStressCommand& c) {
   const std::vector<std::uint32_t>& nodes = stress.ask(simulation, c, [&](const std::string& list) {
     return lists[list] = options.files.node_list(list);
   });
@@ -114,17 +115,19 @@ void SceneRun::State::tell_stress(const EmitStressCommand& c) {
     options.events->stress(simulation.time(), c.object, nodes);
 }
 
-void SceneRun::State::schedule(const Command& command, const ChangeCommand& what) {
-  Change change = scene_change(what, simulation, [&](const std::string& list) {
+void SceneRun::State::schedule(const formats::Command& command,
+                               const formats::ChangeCommand& what) {
+  scene::Change change = formats::scene_change(what, simulation, [&](const std::string& list) {
     return lists[list] = options.files.node_list(list);
   });
-  if (auto* const two_step = std::get_if<SetTwoStep>(&change)) {
+  if (auto* const two_step = std::get_if<scene::SetTwoStep>(&change)) {
     if (stress.asked(two_step->object))
       throw Error("object " + what.object +
                   " emits its stress, which two stiffnesses do not define, expected no two-step");
     add_stage(*two_step, what.stage);
   }
-  if (auto* const set = std::get_if<SetInstrument>(&change); set != nullptr && !what.mesh.empty())
+  if (auto* const set = std::get_if<scene::SetInstrument>(&change);
+      set != nullptr && !what.mesh.empty())
     set->shape = options.files.instrument(what.mesh, set->shape);
   if (command.every)
     simulation.schedule(simulation.time(), change, *command.at);
@@ -134,13 +137,13 @@ void SceneRun::State::schedule(const Command& command, const ChangeCommand& what
     simulation.apply(change);
 }
 
-void SceneRun::State::step(const StepCommand& c) {
+void SceneRun::State::step(const formats::StepCommand& c) {
   go_on([&] {
-    simulation.step(c.dt.value_or(simulation.settings().timestep.value_or(default_step)));
+    simulation.step(c.dt.value_or(simulation.settings().timestep.value_or(formats::default_step)));
   });
 }
 
-void SceneRun::State::run(const RunCommand& c) {
+void SceneRun::State::run(const formats::RunCommand& c) {
   require_object();
   const double start = simulation.time(), span = c.until - start;
   const double exact = span / c.every;
@@ -151,7 +154,7 @@ void SceneRun::State::run(const RunCommand& c) {
       throw Error("the client of these steps has disconnected");
     go_on([&] {
       simulation.step_to(time);
-      under_way = RunCommand{time, c.every};
+      under_way = formats::RunCommand{time, c.every};
     });
   };
   // A hair more than a whole number of steps is rounding; a last one may be shorter.
@@ -162,25 +165,25 @@ void SceneRun::State::run(const RunCommand& c) {
     sample(c.until); // which refuses a past one
 }
 
-void SceneRun::State::execute(const Command& command) {
-  if (const auto* const change = std::get_if<ChangeCommand>(&command.what))
+void SceneRun::State::execute(const formats::Command& command) {
+  if (const auto* const change = std::get_if<formats::ChangeCommand>(&command.what))
     schedule(command, *change);
-  else if (const auto* const object = std::get_if<ObjectCommand>(&command.what))
+  else if (const auto* const object = std::get_if<formats::ObjectCommand>(&command.what))
     add(*object);
-  else if (const auto* const emit = std::get_if<EmitModelCommand>(&command.what))
+  else if (const auto* const emit = std::get_if<formats::EmitModelCommand>(&command.what))
     write(*emit);
-  else if (const auto* const tensors = std::get_if<EmitStressCommand>(&command.what))
+  else if (const auto* const tensors = std::get_if<formats::EmitStressCommand>(&command.what))
     tell_stress(*tensors);
-  else if (const auto* const one = std::get_if<StepCommand>(&command.what))
+  else if (const auto* const one = std::get_if<formats::StepCommand>(&command.what))
     step(*one);
-  else if (const auto* const many = std::get_if<RunCommand>(&command.what))
+  else if (const auto* const many = std::get_if<formats::RunCommand>(&command.what))
     run(*many);
-  else if (const auto* const query = std::get_if<QueryCommand>(&command.what))
+  else if (const auto* const query = std::get_if<formats::QueryCommand>(&command.what))
     tell(*query);
-  else if (std::holds_alternative<EndCommand>(command.what))
+  else if (std::holds_alternative<formats::EndCommand>(command.what))
     ended = true;
   else
     sync();
 }
 
-} // namespace gewebe
+} // namespace gewebe::cli

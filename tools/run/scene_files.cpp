@@ -25,7 +25,7 @@
 #include <utility>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::cli {
 
 namespace {
 
@@ -45,7 +45,7 @@ struct stat facts_of(const std::string& path) {
 }
 
 /// Not longer than a list may be, for a device has no end.
-std::string list_text(Input input) {
+std::string list_text(formats::Input input) {
   (void)input.peek(1); // something must be there
   std::string text;
   for (std::vector<char> chunk(65536); input.stream();) {
@@ -104,25 +104,26 @@ SceneFiles scene_files(const std::string& scene, const Context& context,
     Context reading = context;
     if (!S_ISREG(facts_of(path).st_mode)) // it may have no end, and memory has one
       reading.max_memory = std::min(reading.max_memory, longest_piped);
-    Input input(path, false);
+    formats::Input input(path, false);
     Space space = Space::unknown;
-    Model model = read_ela(input, reading, &space);
+    model::Model model = formats::read_ela(input, reading, &space);
     spaces->add(input.name(), space);
     return model;
   };
-  files.store = [resolve](const std::string& name, const Model& model) {
-    const auto store = std::make_shared<StiffnessStore>(resolve(name));
-    const StiffnessFacts facts = store->facts(model);
-    return StoredStiffness{store->columns(facts), [store, facts] { return store->factor(facts); }};
+  files.store = [resolve](const std::string& name, const model::Model& model) {
+    const auto store = std::make_shared<formats::StiffnessStore>(resolve(name));
+    const formats::StiffnessFacts facts = store->facts(model);
+    return compliance::StoredStiffness{store->columns(facts),
+                                       [store, facts] { return store->factor(facts); }};
   };
-  files.second_stage = [resolve](const std::string& name, const Model& model) {
-    const auto store = std::make_shared<StiffnessStore>(resolve(name));
-    const std::optional<StiffnessFacts> facts = store->second_stage(store->facts(model));
+  files.second_stage = [resolve](const std::string& name, const model::Model& model) {
+    const auto store = std::make_shared<formats::StiffnessStore>(resolve(name));
+    const std::optional<formats::StiffnessFacts> facts = store->second_stage(store->facts(model));
     if (!facts)
       throw Error(resolve(name), "no second stage of this object, expected one, "
                                  "see --stage of ffe-precompute(1)");
     return [store, facts] {
-      return compliance_of_store(
+      return compliance::compliance_of_store(
           {store->columns(*facts), [store, facts] { return store->factor(*facts); }});
     };
   };
@@ -130,33 +131,33 @@ SceneFiles scene_files(const std::string& scene, const Context& context,
     const std::string path = resolve(name);
     if (!S_ISREG(facts_of(path).st_mode)) // a pipe without a writer would block
       throw Error(path, "is no regular file, expected one");
-    return list_text(Input(path, false));
+    return list_text(formats::Input(path, false));
   };
-  files.instrument = [resolve, context](const std::string& name, InstrumentShape shape) {
+  files.instrument = [resolve, context](const std::string& name, contact::InstrumentShape shape) {
     const std::string path = resolve(name);
     (void)facts_of(path);
-    Input input(path, true);
+    formats::Input input(path, true);
     // The readers of other formats would have to be loaded with this program, at every start.
-    if (input_kind(input.peek(4096), path, "") != Kind::ply)
+    if (formats::input_kind(input.peek(4096), path, "") != formats::Kind::ply)
       throw Error(path, "is no PLY file, expected one, as exp2ela --to ply makes of any mesh");
     TriangleMesh mesh =
-        at(path, [&] { return read_ply(input.read_all(context.max_memory), path); });
-    weld(mesh, {.mode = Weld::all, .drop_unused = true});
-    shape.core = at(path, [&] { return std::make_shared<const ConvexCore>(mesh); });
+        at(path, [&] { return formats::read_ply(input.read_all(context.max_memory), path); });
+    repair::weld(mesh, {.mode = repair::Weld::all, .drop_unused = true});
+    shape.core = at(path, [&] { return std::make_shared<const contact::ConvexCore>(mesh); });
     if (!(shape.radius > 0))
       shape.radius = shape.core->size() / 100;
     return shape;
   };
-  files.write_model = [resolve, context](const std::string& name, const Model& model) {
-    Output::Options whole;
+  files.write_model = [resolve, context](const std::string& name, const model::Model& model) {
+    formats::Output::Options whole;
     whole.binary = false;
     whole.sync = true;
     whole.beside = true;
-    Output output(resolve(name), whole);
-    write_ela(output, model, context);
+    formats::Output output(resolve(name), whole);
+    formats::write_ela(output, model, context);
     output.commit();
   };
   return files;
 }
 
-} // namespace gewebe
+} // namespace gewebe::cli

@@ -16,7 +16,7 @@
 #include <variant>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::cli {
 
 namespace {
 
@@ -29,24 +29,24 @@ public:
   bool add(std::string_view line) {
     if (!is_about_time(line))
       return true;
-    std::optional<Command> command;
+    std::optional<formats::Command> command;
     try {
-      command = parse_scene_line(line);
+      command = formats::parse_scene_line(line);
     } catch (const Error&) {
       return true;
     }
     if (!command)
       return true;
-    if (const auto* const step = std::get_if<StepCommand>(&command->what)) {
+    if (const auto* const step = std::get_if<formats::StepCommand>(&command->what)) {
       take_timesteps();
       time_ += step->dt.value_or(timestep_);
-    } else if (const auto* const run = std::get_if<RunCommand>(&command->what)) {
+    } else if (const auto* const run = std::get_if<formats::RunCommand>(&command->what)) {
       time_ = std::max(time_, run->until);
-    } else if (const auto* const change = std::get_if<ChangeCommand>(&command->what)) {
-      if (const auto* const set = std::get_if<SetTimestep>(&change->change))
+    } else if (const auto* const change = std::get_if<formats::ChangeCommand>(&command->what)) {
+      if (const auto* const set = std::get_if<scene::SetTimestep>(&change->change))
         timesteps_.emplace_back(command->at.value_or(time_), set->dt);
     }
-    return !std::holds_alternative<EndCommand>(command->what);
+    return !std::holds_alternative<formats::EndCommand>(command->what);
   }
 
 private:
@@ -65,7 +65,7 @@ private:
     });
   }
 
-  double time_ = 0, timestep_ = default_step;
+  double time_ = 0, timestep_ = formats::default_step;
   std::vector<std::pair<double, double>> timesteps_; ///< when it changes, and to what
 };
 
@@ -188,4 +188,4 @@ void start_progress(std::optional<SceneProgress>& progress, cli::ProgressBar* ba
   progress.emplace(*bar, listens ? std::nullopt : find_scene_end(scene));
 }
 
-} // namespace gewebe
+} // namespace gewebe::cli

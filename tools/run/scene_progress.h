@@ -8,7 +8,7 @@
 #include <optional>
 #include <string>
 
-namespace gewebe {
+namespace gewebe::cli {
 
 /// Finds the simulated time in s at which a scene ends, from its steps and runs, without carrying
 /// them out. Wrong lines are passed over.
@@ -48,4 +48,4 @@ private:
 void start_progress(std::optional<SceneProgress>& progress, cli::ProgressBar* bar,
                     const std::string& scene, bool listens);
 
-} // namespace gewebe
+} // namespace gewebe::cli

@@ -9,7 +9,7 @@
 #include <filesystem>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::cli {
 
 namespace {
 
@@ -22,7 +22,7 @@ fs::path folder_of(const std::string& file) {
   return failure ? fs::path(".") : folder;
 }
 
-Output::Options as_part(Output::Options options) {
+formats::Output::Options as_part(formats::Output::Options options) {
   options.part = true;
   options.binary = false;
   options.beside = true;
@@ -44,7 +44,7 @@ std::string numbered(const std::string& selector, const std::map<std::string, st
                  quoted ? selector.find('\'', begin) : selector.find_first_of(" \t()", begin));
     const std::string name = selector.substr(begin, end - begin);
     std::string numbers;
-    for (const auto& [first, last] : parse_node_list(lists.at(name), name))
+    for (const auto& [first, last] : model::parse_node_list(lists.at(name), name))
       numbers += (numbers.empty() ? "" : ",") + std::to_string(first) +
                  (last > first ? "-" + std::to_string(last) : "");
     text += numbers.empty() ? "(x<0 and x>=0)" : numbers;
@@ -55,7 +55,7 @@ std::string numbered(const std::string& selector, const std::map<std::string, st
 
 } // namespace
 
-SceneRecord::SceneRecord(const std::string& path, const Output::Options& options,
+SceneRecord::SceneRecord(const std::string& path, const formats::Output::Options& options,
                          const std::string& scene)
     : output_(path, as_part(options)) {
   std::error_code none;
@@ -82,16 +82,16 @@ std::string SceneRecord::moved(const std::string& file) const {
   return file.starts_with('/') ? file : prefix_ + file;
 }
 
-void SceneRecord::line(std::string_view text, const Command& command,
+void SceneRecord::line(std::string_view text, const formats::Command& command,
                        const std::map<std::string, std::string>& lists) {
-  const bool object = std::holds_alternative<ObjectCommand>(command.what);
-  const bool model = std::holds_alternative<EmitModelCommand>(command.what);
-  const auto* const change = std::get_if<ChangeCommand>(&command.what);
+  const bool object = std::holds_alternative<formats::ObjectCommand>(command.what);
+  const bool model = std::holds_alternative<formats::EmitModelCommand>(command.what);
+  const auto* const change = std::get_if<formats::ChangeCommand>(&command.what);
   const bool stage = change != nullptr && !change->stage.empty();
   const bool mesh = change != nullptr && !change->mesh.empty();
   if (object || model || stage || mesh ? prefix_.empty() : lists.empty())
     return write(text);
-  std::vector<std::string> words = scene_words(text);
+  std::vector<std::string> words = formats::scene_words(text);
   if (model) {
     words[3] = moved(words[3]);
   } else if (object) {
@@ -107,15 +107,15 @@ void SceneRecord::line(std::string_view text, const Command& command,
     for (std::string& word : words)
       word = numbered(word, lists);
   }
-  write(scene_line(words));
+  write(formats::scene_line(words));
 }
 
 void SceneRecord::run(double until, double every) {
-  write("run " + number_text(until) + " every " + number_text(every));
+  write("run " + text::number_text(until) + " every " + text::number_text(every));
 }
 
 void SceneRecord::commit() {
   output_.commit();
 }
 
-} // namespace gewebe
+} // namespace gewebe::cli

@@ -8,7 +8,7 @@
 #include <string>
 #include <string_view>
 
-namespace gewebe {
+namespace gewebe::cli {
 
 class SceneRecord {
 public:
@@ -16,11 +16,12 @@ public:
   /// of files count from the record's folder. \param scene the recorded one, as in scene_files
   /// \throw Error, UsageError as Output; Error if the folder of the scene has a name that no line
   /// can hold
-  SceneRecord(const std::string& path, const Output::Options& options, const std::string& scene);
+  SceneRecord(const std::string& path, const formats::Output::Options& options,
+              const std::string& scene);
 
   /// A line that was carried out. \param lists the node lists that it names, and their text: the
   /// record has the numbers instead   \throw Error
-  void line(std::string_view text, const Command& command,
+  void line(std::string_view text, const formats::Command& command,
             const std::map<std::string, std::string>& lists);
   /// The part of a `run` that was carried out before it failed.
   void run(double until, double every);
@@ -31,8 +32,8 @@ private:
   void write(std::string_view line);
   std::string moved(const std::string& file) const;
 
-  Output output_;
+  formats::Output output_;
   std::string prefix_; ///< of relative names; none if they count from the same folder
 };
 
-} // namespace gewebe
+} // namespace gewebe::cli

@@ -18,7 +18,7 @@
 #include <variant>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::cli {
 
 std::string with_place(const Error& error) {
   return (error.place().empty() ? "" : error.place() + ": ") + error.what();
@@ -32,8 +32,8 @@ SceneRun::State::State(std::string n, const Context& context, SceneOptions o)
     shared.emplace(*options.shared);
 }
 
-SimulationOptions SceneRun::State::simulation_options() {
-  SimulationOptions s;
+scene::SimulationOptions SceneRun::State::simulation_options() {
+  scene::SimulationOptions s;
   s.measure_error = s.verify_shapes = options.measure_error;
   s.tolerance = options.tolerance;
   s.guard = options.serve;
@@ -44,12 +44,12 @@ SimulationOptions SceneRun::State::simulation_options() {
   if (options.warn)
     s.warn = [this](const std::string& text) { warn(text); };
   s.distrust = [this](const std::string& text) { distrust(text); };
-  s.applied = [this](const Change& change) {
-    if (const auto* const set_gravity = std::get_if<SetGravity>(&change))
+  s.applied = [this](const scene::Change& change) {
+    if (const auto* const set_gravity = std::get_if<scene::SetGravity>(&change))
       gravity = set_gravity->gravity;
   };
   if (options.events != nullptr)
-    s.log = [this](const ChangeRow& row) { options.events->change(simulation.time(), row); };
+    s.log = [this](const scene::ChangeRow& row) { options.events->change(simulation.time(), row); };
   return s;
 }
 
@@ -70,21 +70,24 @@ void SceneRun::State::distrust(const std::string& text) {
 void SceneRun::State::sync() {
   if (options.reply)
     deliver([&] {
-      options.reply(options.binary ? binary_sync(simulation, steps) : text_sync(simulation));
+      options.reply(options.binary ? formats::binary_sync(simulation, steps)
+                                   : formats::text_sync(simulation));
     });
 }
 
 /// Also without a reader, so that a wrong question is an error everywhere.
-void SceneRun::State::tell(const QueryCommand& query) {
-  const std::string text = text_query(simulation, query, options.files.node_list);
+void SceneRun::State::tell(const formats::QueryCommand& query) {
+  const std::string text = formats::text_query(simulation, query, options.files.node_list);
   if (options.reply)
-    deliver([&] { options.reply(options.binary ? binary_told(steps, text) : text); });
+    deliver([&] { options.reply(options.binary ? formats::binary_told(steps, text) : text); });
 }
 
 void SceneRun::State::acknowledge() {
   if (options.acknowledge && options.reply)
-    deliver(
-        [&] { options.reply(options.binary ? binary_ok(steps, line.line) : text_ok(line.line)); });
+    deliver([&] {
+      options.reply(options.binary ? formats::binary_ok(steps, line.line)
+                                   : formats::text_ok(line.line));
+    });
 }
 
 void SceneRun::State::require_object() const {
@@ -100,20 +103,21 @@ void SceneRun::State::answer() {
       [this](const std::string& text) { distrust(text); });
   instrument_check.look(simulation, [this](const std::string& text) { warn(text); });
   stress.find(simulation, gravity);
-  const std::vector<EstimateAnswer> estimated =
-      options.estimate ? estimates.find(simulation, gravity) : std::vector<EstimateAnswer>{};
+  const std::vector<formats::EstimateAnswer> estimated =
+      options.estimate ? estimates.find(simulation, gravity)
+                       : std::vector<formats::EstimateAnswer>{};
   answered_gravity = gravity;
   if (shared) // before the reader of the answer looks
     shared->frame(simulation, steps);
   if (options.reply)
     deliver([&] {
-      const std::vector<StressAnswer> stresses = stress.answers();
-      const AnswerFields fields{stresses, estimated};
-      options.reply(options.binary ? binary_answer(simulation, steps, fields)
-                                   : text_answer(simulation, steps, fields));
+      const std::vector<formats::StressAnswer> stresses = stress.answers();
+      const formats::AnswerFields fields{stresses, estimated};
+      options.reply(options.binary ? formats::binary_answer(simulation, steps, fields)
+                                   : formats::text_answer(simulation, steps, fields));
     });
   if (options.events != nullptr) {
-    for (const Cutting& c : simulation.news().cuttings)
+    for (const scene::Cutting& c : simulation.news().cuttings)
       options.events->cutting(simulation, c);
     options.events->instruments(simulation);
   }
@@ -135,7 +139,7 @@ void SceneRun::State::measure() {
   for (std::size_t i = 0; i < simulation.object_count(); ++i) {
     // Only on request: measuring must not cost a shape.
     const std::span<const double> u = simulation.known_surface(i);
-    const std::vector<NodeVector>& forces = simulation.contact_forces(i);
+    const std::vector<contact::NodeVector>& forces = simulation.contact_forces(i);
     // Whether an object was read must not matter.
     if (forces.empty() && std::all_of(u.begin(), u.end(), [](double x) { return x == 0; }))
       continue;
@@ -143,19 +147,19 @@ void SceneRun::State::measure() {
     for (std::size_t k = 0; k < u.size(); k += 3)
       counts.largest_displacement =
           std::max(counts.largest_displacement, norm({u[k], u[k + 1], u[k + 2]}));
-    for (const NodeVector& f : forces) {
+    for (const contact::NodeVector& f : forces) {
       digest.add(std::uint64_t{f.node});
       digest.add_bytes(&f.value, sizeof f.value);
     }
   }
 }
 
-void SceneRun::State::accept(std::string_view text, const Command& command) {
+void SceneRun::State::accept(std::string_view text, const formats::Command& command) {
   ++counts.commands;
   answered_gravity = gravity;
   deliver([&] {
-    if (options.record != nullptr && !std::holds_alternative<QueryCommand>(command.what) &&
-        !std::holds_alternative<EndCommand>(command.what))
+    if (options.record != nullptr && !std::holds_alternative<formats::QueryCommand>(command.what) &&
+        !std::holds_alternative<formats::EndCommand>(command.what))
       options.record->line(text, command, lists);
     if (options.events != nullptr)
       options.events->keep();
@@ -183,8 +187,8 @@ void SceneRun::State::refuse(const LinePlace& at, const std::string& text) {
     if (options.reply) {
       const std::string other = at.client == line.client ? ": " : " of an earlier client: ";
       const std::string said = at == line ? text : "line " + std::to_string(at.line) + other + text;
-      const std::string reply = text_error(line.line, said);
-      options.reply(options.binary ? binary_error(steps, reply) : reply);
+      const std::string reply = formats::text_error(line.line, said);
+      options.reply(options.binary ? formats::binary_error(steps, reply) : reply);
     }
   });
 }
@@ -222,7 +226,7 @@ void SceneRun::numbered(Work&& work) {
 
 void SceneRun::line(std::string_view text) {
   numbered([&] {
-    const std::optional<Command> command = parse_scene_line(text);
+    const std::optional<formats::Command> command = formats::parse_scene_line(text);
     if (!command)
       return;
     state_->execute(*command);
@@ -284,7 +288,7 @@ void SceneRun::next_client() {
   state_->line = {0, state_->line.client + 1};
 }
 
-const Simulation& SceneRun::simulation() const {
+const scene::Simulation& SceneRun::simulation() const {
   return state_->simulation;
 }
 
@@ -299,4 +303,4 @@ StepLatency* SceneRun::latency() const {
   return state_->options.latency;
 }
 
-} // namespace gewebe
+} // namespace gewebe::cli

@@ -15,31 +15,36 @@
 #include <string>
 #include <string_view>
 
-namespace gewebe {
+namespace gewebe::formats {
+class SharedShapes;
+} // namespace gewebe::formats
+
+namespace gewebe::cli {
 
 class EventLog;
 class SceneRecord;
-class SharedShapes;
 class StepLatency;
 
 /// How a scene comes to what its file names stand for.
 struct SceneFiles {
   /// That the file is there and may be read, without doing so. May be absent. \throw Error
   std::function<void(const std::string& name)> check;
-  std::function<Model(const std::string& name)> model;
+  std::function<model::Model(const std::string& name)> model;
   /// \throw Error, among others if the store is of another model
-  std::function<StoredStiffness(const std::string& name, const Model& model)> store;
+  std::function<compliance::StoredStiffness(const std::string& name, const model::Model& model)>
+      store;
   /// Second stage of the object in the store, read on demand.
   /// \throw Error, among others if it has none
-  std::function<std::function<std::shared_ptr<ComplianceSource>()>(const std::string& name,
-                                                                   const Model& model)>
+  std::function<std::function<std::shared_ptr<compliance::ComplianceSource>()>(
+      const std::string& name, const model::Model& model)>
       second_stage;
-  LoadNodeList node_list;
+  model::LoadNodeList node_list;
   /// An instrument's shape with the mesh of a file; a radius of 0 becomes a hundredth of its size.
   /// \throw Error
-  std::function<InstrumentShape(const std::string& name, InstrumentShape shape)> instrument;
+  std::function<contact::InstrumentShape(const std::string& name, contact::InstrumentShape shape)>
+      instrument;
   /// Writes a model whole or not at all. May be absent. \throw Error
-  std::function<void(const std::string& name, const Model& model)> write_model;
+  std::function<void(const std::string& name, const model::Model& model)> write_model;
 };
 
 /// From files; relative names count from the folder of `scene`, or from the working folder where
@@ -57,12 +62,12 @@ struct SceneOptions {
   std::function<void(const std::string&)> warn;
   /// Gets, once per object, why its shape is not to be trusted; default: `warn`.
   std::function<void(const std::string&)> distrust{};
-  double rate = 0;                ///< see SimulationOptions
-  ResultWriter* result = nullptr; ///< gets objects and frames; none of these is committed
+  double rate = 0;                         ///< see SimulationOptions
+  formats::ResultWriter* result = nullptr; ///< gets objects and frames; none of these is committed
   EventLog* events = nullptr;
   SceneRecord* record = nullptr;
   StepLatency* latency = nullptr;
-  SharedShapes* shared = nullptr; ///< gets the shapes of each answer before it is sent
+  formats::SharedShapes* shared = nullptr; ///< gets the shapes of each answer before it is sent
   /// Called behind each answer with the scene's time in s and the frames so far: of the result, or
   /// answers if there is none. May be absent.
   std::function<void(double time, std::uint64_t frames)> progress{};
@@ -109,7 +114,7 @@ public:
   /// About the lines that were refused under `serve`, naming the first; nothing if there is none.
   std::optional<Error> first_error() const;
 
-  const Simulation& simulation() const;
+  const scene::Simulation& simulation() const;
   SceneCounts counts() const;
   StepLatency* latency() const;
 
@@ -120,4 +125,4 @@ private:
   std::unique_ptr<State> state_;
 };
 
-} // namespace gewebe
+} // namespace gewebe::cli

@@ -19,7 +19,7 @@
 #include <string_view>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::cli {
 
 /// A file that a line names may be wrong in a place of its own: both places count.
 std::string with_place(const Error& error);
@@ -40,14 +40,14 @@ struct WrongFile {
 struct SceneRun::State {
   std::string name;
   SceneOptions options;
-  Simulation simulation;
+  scene::Simulation simulation;
   SceneCounts counts;
   Digest digest;
   LinePlace line;
   std::uint64_t steps = 0;
   bool ended = false;
-  std::map<std::string, std::string> lists; // node lists that the line named
-  std::optional<RunCommand> under_way;      // of a run of several steps, as far as it came
+  std::map<std::string, std::string> lists;     // node lists that the line named
+  std::optional<formats::RunCommand> under_way; // of a run of several steps, as far as it came
   Error first_error{""};
   SceneChecks checks;
   InstrumentCheck instrument_check;
@@ -61,22 +61,22 @@ struct SceneRun::State {
 
   State(std::string n, const Context& context, SceneOptions o);
 
-  SimulationOptions simulation_options();
+  scene::SimulationOptions simulation_options();
   void warn(const std::string& text);
   void distrust(const std::string& text);
   /// \throw Error without one
   void require_object() const;
 
   // One command, scene_commands.cpp. Each throws Error if it can't be carried out.
-  void execute(const Command& command);
-  void add(const ObjectCommand& c);
+  void execute(const formats::Command& command);
+  void add(const formats::ObjectCommand& c);
   /// Two-step takes the second stage from the object's store, unless it has a model.
-  void add_stage(SetTwoStep& set, const std::string& file);
-  void write(const EmitModelCommand& c);
-  void tell_stress(const EmitStressCommand& c);
-  void schedule(const Command& command, const ChangeCommand& what);
-  void step(const StepCommand& c);
-  void run(const RunCommand& c);
+  void add_stage(scene::SetTwoStep& set, const std::string& file);
+  void write(const formats::EmitModelCommand& c);
+  void tell_stress(const formats::EmitStressCommand& c);
+  void schedule(const formats::Command& command, const formats::ChangeCommand& what);
+  void step(const formats::StepCommand& c);
+  void run(const formats::RunCommand& c);
   /// A step and its answer, behind the first frame. Only when the step is done, so that one that
   /// fails leaves nothing.
   template <class Step>
@@ -84,16 +84,16 @@ struct SceneRun::State {
 
   // What follows, scene_run.cpp.
   void sync();
-  void tell(const QueryCommand& query);
+  void tell(const formats::QueryCommand& query);
   void answer();
   void acknowledge();
   void measure();
   /// The line was carried out.
-  void accept(std::string_view text, const Command& command);
+  void accept(std::string_view text, const formats::Command& command);
   /// The line was not carried out, or only in part if it has many steps.
   void refuse(const LinePlace& at, const std::string& text);
   /// How messages name it.
   std::string named(const LinePlace& at) const;
 };
 
-} // namespace gewebe
+} // namespace gewebe::cli

@@ -6,7 +6,7 @@
 #include <chrono>
 #include <cmath>
 
-namespace gewebe {
+namespace gewebe::cli {
 
 namespace {
 
@@ -29,8 +29,8 @@ std::size_t StepLatency::bin(double seconds) {
   return power * parts + static_cast<std::size_t>((2 * half - 1) * parts);
 }
 
-void StepLatency::log_to(const std::string& path, const Output::Options& options) {
-  Output::Options log = options;
+void StepLatency::log_to(const std::string& path, const formats::Output::Options& options) {
+  formats::Output::Options log = options;
   log.log = "step,time,latency\n";
   log.beside = true;
   log_.emplace(path, log);
@@ -47,8 +47,8 @@ void StepLatency::answered(std::uint64_t step, double time) {
   sum_ += latency;
   missed_ += latency * rate_ > 1 ? 1 : 0;
   if (log_)
-    log_->append_whole(std::to_string(step) + "," + number_text(time) + "," + number_text(latency) +
-                       "\n");
+    log_->append_whole(std::to_string(step) + "," + text::number_text(time) + "," +
+                       text::number_text(latency) + "\n");
 }
 
 void StepLatency::outlive_signals() {
@@ -74,4 +74,4 @@ double StepLatency::quantile(double part) const {
   return largest_;
 }
 
-} // namespace gewebe
+} // namespace gewebe::cli

@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::cli {
 
 /// A latency is the time from the arrival of the line with a step, or from the answer
 /// before if that is later, until the answer has left.
@@ -18,7 +18,7 @@ public:
   explicit StepLatency(double rate) : rate_(rate), counts_(exponents * parts) {}
 
   /// Also writes each as CSV. \throw Error, UsageError as Output
-  void log_to(const std::string& path, const Output::Options& options);
+  void log_to(const std::string& path, const formats::Output::Options& options);
   void line_arrived() { arrived_ = now(); }
   /// The answer to this step, at this time of the scene, has left.
   void answered(std::uint64_t step, double time);
@@ -45,7 +45,7 @@ private:
   double rate_, arrived_ = 0, answered_ = 0, largest_ = 0, sum_ = 0;
   std::uint64_t steps_ = 0, missed_ = 0;
   std::vector<std::uint64_t> counts_; ///< by power of two and part of it
-  std::optional<Output> log_;
+  std::optional<formats::Output> log_;
 };
 
-} // namespace gewebe
+} // namespace gewebe::cli

@@ -14,7 +14,7 @@
 #include <sys/un.h>
 #include <unistd.h>
 
-namespace gewebe {
+namespace gewebe::cli {
 
 namespace {
 
@@ -42,7 +42,7 @@ void remove_stale(const std::string& path, const sockaddr_un& address) {
     return; // bind reports what is wrong
   if (!S_ISSOCK(info.st_mode))
     throw Error(path, "is there and is no socket, expected another name");
-  const Descriptor probe(::socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0));
+  const formats::Descriptor probe(::socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0));
   if (!probe)
     fail(path, "cannot make a socket");
   if (::connect(probe.get(), reinterpret_cast<const sockaddr*>(&address), sizeof address) == 0 ||
@@ -64,8 +64,8 @@ bool rename_to_new(const std::string& from, const std::string& to) {
 }
 
 /// One that can be had at any time but must not be used for anything.
-Descriptor spare_descriptor() {
-  return Descriptor(::open("/dev/null", O_RDONLY | O_CLOEXEC));
+formats::Descriptor spare_descriptor() {
+  return formats::Descriptor(::open("/dev/null", O_RDONLY | O_CLOEXEC));
 }
 
 std::string user_name(uid_t user) {
@@ -81,7 +81,7 @@ std::string user_name(uid_t user) {
 
 LocalListener::LocalListener(const std::string& path) : path_(path), spare_(spare_descriptor()) {
   const sockaddr_un address = address_of(path);
-  const Descriptor lock = lock_folder_of(path);
+  const formats::Descriptor lock = formats::lock_folder_of(path);
   remove_stale(path, address);
   // Clients that find the path must be able to connect, so the socket listens under another name
   // first. A name that is too long for that is bound at once.
@@ -89,11 +89,11 @@ LocalListener::LocalListener(const std::string& path) : path_(path), spare_(spar
   const std::string first = long_name ? path : path + "~";
   const sockaddr_un first_address = address_of(first);
   remove_stale(first, first_address);
-  socket_ = Descriptor(::socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0));
+  socket_ = formats::Descriptor(::socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0));
   // Linux gives the path the mode of the socket, so that it is never open to others.
   if (!socket_ || ::fchmod(socket_.get(), 0600) != 0)
     fail(path, "cannot make a socket");
-  const SignalsWait wait;
+  const formats::SignalsWait wait;
   if (::bind(socket_.get(), reinterpret_cast<const sockaddr*>(&first_address),
              sizeof first_address) != 0)
     fail(path, "cannot listen there");
@@ -103,7 +103,7 @@ LocalListener::LocalListener(const std::string& path) : path_(path), spare_(spar
   file_ = info.st_ino;
   if (seen && (info.st_mode & 0077U) == 0 && ::listen(socket_.get(), waiting_clients) == 0 &&
       (long_name || rename_to_new(first, path))) {
-    removal_ = remember_removal(path);
+    removal_ = formats::remember_removal(path);
     return;
   }
   const int error = errno;
@@ -113,7 +113,7 @@ LocalListener::LocalListener(const std::string& path) : path_(path), spare_(spar
 }
 
 LocalListener::~LocalListener() {
-  forget_removal(removal_);
+  formats::forget_removal(removal_);
   struct stat info {}; // what another has put there stays
   if (::lstat(path_.c_str(), &info) == 0 && info.st_dev == device_ && info.st_ino == file_)
     (void)::unlink(path_.c_str());
@@ -123,7 +123,8 @@ LocalListener::Arrival LocalListener::accept() {
   if (!spare_)
     spare_ = spare_descriptor();
   const auto next = [&] {
-    return Descriptor(::accept4(socket_.get(), nullptr, nullptr, SOCK_CLOEXEC | SOCK_NONBLOCK));
+    return formats::Descriptor(
+        ::accept4(socket_.get(), nullptr, nullptr, SOCK_CLOEXEC | SOCK_NONBLOCK));
   };
   Arrival arrival{next()};
   const int error = arrival.client ? 0 : errno;
@@ -134,7 +135,7 @@ LocalListener::Arrival LocalListener::accept() {
   arrival.refusal = std::string("no file descriptor is left for a client, expected fewer open "
                                 "files or a higher limit: ") +
                     std::strerror(error);
-  spare_ = Descriptor();
+  spare_ = formats::Descriptor();
   arrival.client = next();
   if (!arrival.client && errno != EAGAIN)
     fail(path_, "no file descriptor is left to turn a client away");
@@ -143,7 +144,7 @@ LocalListener::Arrival LocalListener::accept() {
   return arrival;
 }
 
-std::optional<std::string> foreign_peer(const Descriptor& client) {
+std::optional<std::string> foreign_peer(const formats::Descriptor& client) {
   ucred peer{};
   socklen_t size = sizeof peer;
   if (::getsockopt(client.get(), SOL_SOCKET, SO_PEERCRED, &peer, &size) != 0)
@@ -154,7 +155,7 @@ std::optional<std::string> foreign_peer(const Descriptor& client) {
          user_name(::geteuid());
 }
 
-Transfer send_some(const Descriptor& to, std::string& bytes) {
+Transfer send_some(const formats::Descriptor& to, std::string& bytes) {
   std::size_t done = 0;
   Transfer result = Transfer::none_now;
   while (done < bytes.size()) {
@@ -173,7 +174,7 @@ Transfer send_some(const Descriptor& to, std::string& bytes) {
   return result;
 }
 
-Received receive_some(const Descriptor& from, std::span<char> buffer) {
+Received receive_some(const formats::Descriptor& from, std::span<char> buffer) {
   ssize_t count = 0;
   do
     count = ::recv(from.get(), buffer.data(), buffer.size(), 0);
@@ -184,4 +185,4 @@ Received receive_some(const Descriptor& from, std::span<char> buffer) {
   return {later ? Transfer::none_now : Transfer::over};
 }
 
-} // namespace gewebe
+} // namespace gewebe::cli

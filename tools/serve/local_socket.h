@@ -9,7 +9,7 @@
 #include <string>
 #include <string_view>
 
-namespace gewebe {
+namespace gewebe::cli {
 
 /// Listens at a path, that its owner alone may connect to. The path is gone at the end, as
 /// formats/stream/removal.h has it.
@@ -24,7 +24,7 @@ public:
 
   int descriptor() const noexcept { return socket_.get(); }
   struct Arrival {
-    Descriptor client{};
+    formats::Descriptor client{};
     /// Why it can't stay: no descriptor was left for it. It has one that is kept for this and must
     /// be closed before the next is accepted. "": it may stay
     std::string refusal{};
@@ -35,27 +35,27 @@ public:
 
 private:
   std::string path_;
-  Descriptor socket_;
-  Descriptor spare_;                    ///< reserve, to refuse a client when descriptors run out
+  formats::Descriptor socket_;
+  formats::Descriptor spare_;           ///< reserve, to refuse a client when descriptors run out
   std::uint64_t device_ = 0, file_ = 0; ///< of the path
   int removal_ = -1;
 };
 
 /// About a client of another user than this process's, "user NAME (ID) may not …"; nothing if it is
 /// the same.
-std::optional<std::string> foreign_peer(const Descriptor& client);
+std::optional<std::string> foreign_peer(const formats::Descriptor& client);
 
 /// How a transfer ended that does not wait.
 enum class Transfer { some, none_now, over };
 
 /// Sends what the other end takes now, and removes it from `bytes`: some, or over where there is no
 /// other end.
-Transfer send_some(const Descriptor& to, std::string& bytes);
+Transfer send_some(const formats::Descriptor& to, std::string& bytes);
 /// What has come, up to the size of the buffer, which it is in. Over: no more will come.
 struct Received {
   Transfer how = Transfer::none_now;
   std::string_view bytes{};
 };
-Received receive_some(const Descriptor& from, std::span<char> buffer);
+Received receive_some(const formats::Descriptor& from, std::span<char> buffer);
 
-} // namespace gewebe
+} // namespace gewebe::cli

@@ -5,7 +5,7 @@
 #include <ostream>
 #include <utility>
 
-namespace gewebe {
+namespace gewebe::cli {
 
 SceneAnswers::SceneAnswers(bool spoken, bool binary, const std::string& listen,
                            SceneClientsOptions options)
@@ -14,10 +14,10 @@ SceneAnswers::SceneAnswers(bool spoken, bool binary, const std::string& listen,
   if (!listen.empty())
     clients_.emplace(listen, std::move(options));
   if (spoken)
-    spoken_.emplace("-", Output::Options{.binary = binary});
+    spoken_.emplace("-", formats::Output::Options{.binary = binary});
 }
 
-void SceneAnswers::run(Input* input, SceneRun& scene) {
+void SceneAnswers::run(formats::Input* input, SceneRun& scene) {
   if (input != nullptr)
     run_lines(*input, scene, awake_);
   if (clients_)
@@ -39,4 +39,4 @@ void SceneAnswers::commit() {
     spoken_->commit();
 }
 
-} // namespace gewebe
+} // namespace gewebe::cli

@@ -8,7 +8,7 @@
 #include <string>
 #include <string_view>
 
-namespace gewebe {
+namespace gewebe::cli {
 
 class SceneAnswers {
 public:
@@ -18,7 +18,7 @@ public:
 
   /// Feeds the run: the lines of `input`, if there is one, then those of clients until one ends it.
   /// \throw Error as run_lines and SceneClients
-  void run(Input* input, SceneRun& scene);
+  void run(formats::Input* input, SceneRun& scene);
 
   bool any() const noexcept { return spoken_ || clients_; }
   /// Whether the client has disconnected.
@@ -30,7 +30,7 @@ public:
 private:
   bool awake_;
   std::optional<SceneClients> clients_;
-  std::optional<Output> spoken_;
+  std::optional<formats::Output> spoken_;
 };
 
-} // namespace gewebe
+} // namespace gewebe::cli

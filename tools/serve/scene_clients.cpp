@@ -12,7 +12,7 @@
 #include <poll.h>
 #include <utility>
 
-namespace gewebe {
+namespace gewebe::cli {
 
 namespace {
 
@@ -21,9 +21,10 @@ constexpr std::size_t block = 1U << 16U;
 /// Waits for one of them. \return false where it took longer \throw Cancelled on a signal
 bool wait_for(const std::array<pollfd, 2>& who, double seconds) {
   const int limit = seconds < 0 ? -1 : static_cast<int>(std::ceil(seconds * 1000));
-  std::array<pollfd, 3> all{who[0], who[1], pollfd{deferred_signal_descriptor(), POLLIN, 0}};
+  std::array<pollfd, 3> all{who[0], who[1],
+                            pollfd{formats::deferred_signal_descriptor(), POLLIN, 0}};
   const bool any = ::poll(all.data(), all.size(), limit) != 0;
-  check_deferred_signal();
+  formats::check_deferred_signal();
   return any; // an interruption is no end of patience
 }
 
@@ -39,14 +40,14 @@ void SceneClients::serve(SceneRun& run) {
     if (client_ && !leaving_)
       take_lines(run);
     if (client_ && leaving_ && unread_.empty())
-      client_ = Descriptor();
+      client_ = formats::Descriptor();
     if (client_)
       turn_away();
     else
       let_in(run);
   }
   flush(0);
-  client_ = Descriptor();
+  client_ = formats::Descriptor();
   next_ = {};
   serving_ = false;
 }
@@ -60,7 +61,7 @@ void SceneClients::wait() {
     while (!wait_for(who, 0)) {
     }
   else if (!wait_for(who, leaving_ ? options_.patience : -1))
-    return drop("read nothing more for " + number_text(options_.patience) + " s");
+    return drop("read nothing more for " + text::number_text(options_.patience) + " s");
   if (client_ && !unread_.empty() && send_some(client_, unread_) == Transfer::over)
     drop("");
 }
@@ -91,8 +92,8 @@ void SceneClients::let_in(SceneRun& run) {
   leaving_ = false;
   ++clients_;
   run.next_client();
-  reply(options_.binary ? binary_sync(run.simulation(), run.steps())
-                        : text_ready(run.simulation()));
+  reply(options_.binary ? formats::binary_sync(run.simulation(), run.steps())
+                        : formats::text_ready(run.simulation()));
 }
 
 /// Connecting clients, except those that wait for the present one: they must not wake the thread.
@@ -129,10 +130,10 @@ bool SceneClients::refused(const LocalListener::Arrival& next) const {
 }
 
 /// One line that fits into any buffer, for a client that is refused.
-void SceneClients::say(const Descriptor& to, const std::string& text) const {
-  std::string line = text_error(0, text);
+void SceneClients::say(const formats::Descriptor& to, const std::string& text) const {
+  std::string line = formats::text_error(0, text);
   if (options_.binary)
-    line = binary_error(0, line);
+    line = formats::binary_error(0, line);
   (void)send_some(to, line);
 }
 
@@ -142,7 +143,7 @@ bool SceneClients::hung_up() const {
 }
 
 void SceneClients::drop(const std::string& why) {
-  client_ = Descriptor();
+  client_ = formats::Descriptor();
   unread_.clear();
   leaving_ = false;
   if (!why.empty() && options_.warn)
@@ -161,7 +162,8 @@ void SceneClients::flush(std::size_t most) {
     if (sent == Transfer::some)
       left = options_.patience;
     if (!(left > 0))
-      return drop("read nothing for " + number_text(options_.patience) + " s while answers waited");
+      return drop("read nothing for " + text::number_text(options_.patience) +
+                  " s while answers waited");
     std::array<pollfd, 2> who{pollfd{client_.get(), POLLOUT, 0}, others()};
     const auto start = std::chrono::steady_clock::now();
     (void)wait_for(who, left);
@@ -179,4 +181,4 @@ void SceneClients::reply(std::string_view bytes) {
     turn_away();
 }
 
-} // namespace gewebe
+} // namespace gewebe::cli

@@ -14,7 +14,7 @@
 #include <string_view>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::cli {
 
 struct SceneClientsOptions {
   bool binary = false;                ///< what is said beside the answers, too
@@ -46,7 +46,7 @@ private:
   void let_in(SceneRun& run);
   void turn_away();
   bool refused(const LocalListener::Arrival& next) const;
-  void say(const Descriptor& to, const std::string& text) const;
+  void say(const formats::Descriptor& to, const std::string& text) const;
   void drop(const std::string& why);
   void flush(std::size_t most);
   bool hung_up() const;
@@ -54,7 +54,7 @@ private:
 
   SceneClientsOptions options_;
   LocalListener listener_;
-  Descriptor client_;
+  formats::Descriptor client_;
   LocalListener::Arrival next_{}; ///< accepted already, let in when the client has gone
   std::vector<char> buffer_;      ///< of what the client sends
   std::optional<SceneLines> lines_;
@@ -64,4 +64,4 @@ private:
   bool serving_ = false;
 };
 
-} // namespace gewebe
+} // namespace gewebe::cli

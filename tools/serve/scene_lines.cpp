@@ -6,7 +6,7 @@
 #include <istream>
 #include <streambuf>
 
-namespace gewebe {
+namespace gewebe::cli {
 
 namespace {
 
@@ -42,7 +42,7 @@ void SceneLines::drop() {
   size_ = 0;
 }
 
-void run_lines(Input& input, SceneRun& run, bool awake) {
+void run_lines(formats::Input& input, SceneRun& run, bool awake) {
   // The stream's buffer hands out what has come so far and waits only for more.
   std::streambuf& bytes = *input.stream().rdbuf();
   SceneLines lines(run);
@@ -61,9 +61,9 @@ void run_lines(Input& input, SceneRun& run, bool awake) {
   lines.end();
 }
 
-void run_scene(Input& input, SceneRun& run) {
+void run_scene(formats::Input& input, SceneRun& run) {
   run_lines(input, run);
   run.finish();
 }
 
-} // namespace gewebe
+} // namespace gewebe::cli

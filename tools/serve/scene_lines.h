@@ -7,7 +7,7 @@
 #include <cstdint>
 #include <string>
 
-namespace gewebe {
+namespace gewebe::cli {
 
 /// Hands each line to a run as soon as its end is there.
 class SceneLines {
@@ -30,8 +30,8 @@ private:
 /// Feeds every line of the input, up to one that ends it, to the run as soon as it is there.
 /// \param awake wait for lines as Input::wait_awake   \throw Error as the run, and for a line of
 /// over 1 GiB
-void run_lines(Input& input, SceneRun& run, bool awake = false);
+void run_lines(formats::Input& input, SceneRun& run, bool awake = false);
 /// The same, then finishes it.
-void run_scene(Input& input, SceneRun& run);
+void run_scene(formats::Input& input, SceneRun& run);
 
-} // namespace gewebe
+} // namespace gewebe::cli

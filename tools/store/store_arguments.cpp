@@ -4,13 +4,13 @@
 
 #include <charconv>
 
-namespace gewebe {
+namespace gewebe::cli {
 
 namespace {
 
 /// "I/N" with 1 <= I <= N.
-StoreShard shard_of(const std::string& text) {
-  StoreShard shard;
+formats::StoreShard shard_of(const std::string& text) {
+  formats::StoreShard shard;
   const char* const end = text.data() + text.size();
   const auto [slash, first] = std::from_chars(text.data(), end, shard.index);
   if (first == std::errc() && slash != end && *slash == '/') {
@@ -63,7 +63,7 @@ void declare(cli::Program& p, StoreArguments& a) {
       .one_of({"float64", "float32"});
   p.option("--compress", a.compress, "E",
            "compress columns with errors below E of the largest entry")
-      .range(min_relative, 0.1);
+      .range(columns::min_relative, 0.1);
   p.option("--method", a.method, "METHOD", "how columns are computed: direct, relax, relax-fixed")
       .one_of({"direct", "relax", "relax-fixed"});
   p.option("--force", a.force, "F", "force of a relaxation, 1e-6 N").positive();
@@ -119,14 +119,14 @@ void complete(StoreArguments& a) {
   std::vector<std::string> inputs = a.inputs;
   if (a.columns != "none") {
     try {
-      a.touched = parse_selector(a.columns);
+      a.touched = model::parse_selector(a.columns);
     } catch (const Error& error) {
       throw UsageError(std::string("--columns: ") + error.what());
     }
-    const std::vector<std::string> lists = node_list_names(*a.touched);
+    const std::vector<std::string> lists = model::node_list_names(*a.touched);
     inputs.insert(inputs.end(), lists.begin(), lists.end());
   }
   cli::check_one_pipe(inputs);
 }
 
-} // namespace gewebe
+} // namespace gewebe::cli

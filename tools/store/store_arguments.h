@@ -10,7 +10,7 @@
 #include <string>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::cli {
 
 struct StoreArguments {
   std::vector<std::string> inputs; ///< models; the store for --info, shards for --merge
@@ -22,8 +22,8 @@ struct StoreArguments {
   std::optional<std::int64_t> steps;
   std::int64_t stage = 1, jobs = 1;
   bool info = false, verify = false, merge = false;
-  std::optional<Selector> touched;
-  StoreShard shard{};
+  std::optional<model::Selector> touched;
+  formats::StoreShard shard{};
 };
 
 /// Declares the options of a program, with their values in `a`.
@@ -32,4 +32,4 @@ void declare(cli::Program& p, StoreArguments& a);
 /// Checks them against each other and reads their texts. \throw UsageError
 void complete(StoreArguments& a);
 
-} // namespace gewebe
+} // namespace gewebe::cli

@@ -8,7 +8,7 @@
 #include <cstdio>
 #include <filesystem>
 
-namespace gewebe {
+namespace gewebe::cli {
 
 namespace {
 
@@ -21,23 +21,23 @@ std::string number(const char* format, double value) {
   return text;
 }
 
-Verification verify_object(const StiffnessStore& store, const StiffnessFacts& facts,
-                           const Context& context) {
-  const StiffnessMatrix matrix = store.matrix(facts);
-  const Factor factor = store.factor(facts);
-  const std::unique_ptr<ColumnSource> columns = store.columns(facts);
-  const CompressedColumns* const compressed = columns ? columns->compressed() : nullptr;
+columns::Verification verify_object(const formats::StiffnessStore& store,
+                                    const formats::StiffnessFacts& facts, const Context& context) {
+  const linalg::StiffnessMatrix matrix = store.matrix(facts);
+  const linalg::Factor factor = store.factor(facts);
+  const std::unique_ptr<columns::ColumnSource> columns = store.columns(facts);
+  const columns::CompressedColumns* const compressed = columns ? columns->compressed() : nullptr;
   const double bound = compressed != nullptr ? compressed->layout().bound : 0;
   // A relaxation that came to rest.
   const double method_error = facts.method.name == "direct" ? 0 : 1e-6;
-  return verify_compliance(matrix, factor, columns.get(),
-                           {facts.condition, facts.single, method_error, bound, recomputed_nodes},
-                           context);
+  return columns::verify_compliance(
+      matrix, factor, columns.get(),
+      {facts.condition, facts.single, method_error, bound, recomputed_nodes}, context);
 }
 
 /// Of all objects, each followed by its second stage.
-std::vector<StiffnessFacts> all_facts(const StiffnessStore& store) {
-  std::vector<StiffnessFacts> all;
+std::vector<formats::StiffnessFacts> all_facts(const formats::StiffnessStore& store) {
+  std::vector<formats::StiffnessFacts> all;
   for (const std::string& group : store.objects()) {
     all.push_back(store.facts(group));
     if (const auto second = store.second_stage(all.back()))
@@ -46,7 +46,7 @@ std::vector<StiffnessFacts> all_facts(const StiffnessStore& store) {
   return all;
 }
 
-std::string describe(const StiffnessFacts& facts, const StiffnessSizes& sizes) {
+std::string describe(const formats::StiffnessFacts& facts, const formats::StiffnessSizes& sizes) {
   const bool second = facts.group.find('/') != std::string::npos;
   std::string text = "object " + facts.object + (second ? " stage 2" : "") + "\n";
   const auto line = [&](const char* key, const std::string& value) {
@@ -78,7 +78,7 @@ std::string describe(const StiffnessFacts& facts, const StiffnessSizes& sizes) {
   return text;
 }
 
-std::string describe(const Verification& v) {
+std::string describe(const columns::Verification& v) {
   return "  verified_columns " + std::to_string(v.columns_read) + "\n  recomputed_columns " +
          std::to_string(v.recomputed) + "\n  difference " + number("%.2g", v.difference) +
          "\n  asymmetry " + number("%.2g", v.asymmetry) + "\n  tolerance " +
@@ -86,7 +86,7 @@ std::string describe(const Verification& v) {
 }
 
 /// Sums and worst figures over objects.
-void add(Verification& total, const Verification& v) {
+void add(columns::Verification& total, const columns::Verification& v) {
   total.columns_read += v.columns_read;
   total.recomputed += v.recomputed;
   total.difference = std::max(total.difference, v.difference);
@@ -94,7 +94,7 @@ void add(Verification& total, const Verification& v) {
   total.tolerance = std::max(total.tolerance, v.tolerance);
 }
 
-void report(cli::Run& run, const Verification& v) {
+void report(cli::Run& run, const columns::Verification& v) {
   run.stats().set("verified_columns", std::uint64_t{v.columns_read});
   run.stats().set("recomputed_columns", std::uint64_t{v.recomputed});
   run.stats().set("difference", v.difference);
@@ -105,18 +105,18 @@ void report(cli::Run& run, const Verification& v) {
 } // namespace
 
 void print_store(cli::Run& run, const std::string& path, bool verify) {
-  Output output(run.output(), run.output_options(false));
-  const StiffnessStore store(path);
+  formats::Output output(run.output(), run.output_options(false));
+  const formats::StiffnessStore store(path);
   std::string text =
       "store " + path + "\nbytes " + std::to_string(std::filesystem::file_size(path)) + "\n";
-  if (const StoreShard shard = store.shard(); shard.count > 1)
+  if (const formats::StoreShard shard = store.shard(); shard.count > 1)
     text += "shard " + std::to_string(shard.index) + " of " + std::to_string(shard.count) + "\n";
-  Verification total;
-  for (const StiffnessFacts& facts : all_facts(store)) {
+  columns::Verification total;
+  for (const formats::StiffnessFacts& facts : all_facts(store)) {
     text += describe(facts, store.sizes(facts));
     if (!verify)
       continue;
-    const Verification v = run.timed("verify", [&] {
+    const columns::Verification v = run.timed("verify", [&] {
       return at(path, [&] { return verify_object(store, facts, run.context()); });
     });
     text += describe(v);
@@ -128,14 +128,14 @@ void print_store(cli::Run& run, const std::string& path, bool verify) {
   output.commit();
 }
 
-void verify_store(cli::Run& run, const StiffnessStore& store, const std::string& name) {
-  Verification total;
-  for (const StiffnessFacts& facts : all_facts(store))
+void verify_store(cli::Run& run, const formats::StiffnessStore& store, const std::string& name) {
+  columns::Verification total;
+  for (const formats::StiffnessFacts& facts : all_facts(store))
     add(total, at(name, [&] { return verify_object(store, facts, run.context()); }));
   report(run, total);
 }
 
-void report_kept(cli::Run& run, const StiffnessStoreWriter& writer) {
+void report_kept(cli::Run& run, const formats::StiffnessStoreWriter& writer) {
   const std::string part = run.output() + ".part";
   for (const std::uint32_t node : writer.damaged())
     run.warn(part + ": the columns of node " + std::to_string(node) +
@@ -145,7 +145,7 @@ void report_kept(cli::Run& run, const StiffnessStoreWriter& writer) {
 }
 
 void report_store(cli::Run& run, const std::string& path, const StoreTotals& totals,
-                  const StiffnessStoreWriter& writer) {
+                  const formats::StiffnessStoreWriter& writer) {
   cli::Stats& stats = run.stats();
   stats.set("objects", totals.objects);
   stats.set("nodes", totals.nodes);
@@ -162,4 +162,4 @@ void report_store(cli::Run& run, const std::string& path, const StoreTotals& tot
   stats.set("digest", digest_text(writer.digest()));
 }
 
-} // namespace gewebe
+} // namespace gewebe::cli

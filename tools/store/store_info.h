@@ -8,7 +8,7 @@
 #include <cstdint>
 #include <string>
 
-namespace gewebe {
+namespace gewebe::cli {
 
 /// Writes what a store holds as lines "key value" to the run's output; with `verify`, reads all of
 /// it, compares the checksums and recomputes columns.
@@ -17,10 +17,10 @@ void print_store(cli::Run& run, const std::string& path, bool verify);
 
 /// Reads every object of a store back and recomputes the columns of some nodes, for --stats.
 /// \throw Error, place = `name`
-void verify_store(cli::Run& run, const StiffnessStore& store, const std::string& name);
+void verify_store(cli::Run& run, const formats::StiffnessStore& store, const std::string& name);
 
 /// Reports what is kept of an earlier run for the object just begun, and warns of damage.
-void report_kept(cli::Run& run, const StiffnessStoreWriter& writer);
+void report_kept(cli::Run& run, const formats::StiffnessStoreWriter& writer);
 
 /// Sums over the objects of a store that was made, and the worst of each.
 struct StoreTotals {
@@ -30,6 +30,6 @@ struct StoreTotals {
 
 /// Figures of --stats for a finished store at `path`.
 void report_store(cli::Run& run, const std::string& path, const StoreTotals& totals,
-                  const StiffnessStoreWriter& writer);
+                  const formats::StiffnessStoreWriter& writer);
 
-} // namespace gewebe
+} // namespace gewebe::cli

@@ -12,30 +12,31 @@
 #include <optional>
 #include <utility>
 
-namespace gewebe {
+namespace gewebe::cli {
 
 namespace {
 
-CompressedMade chunks_of(const CompressedColumns& columns) {
-  CompressedMade made{columns.layout(), {}, 0};
+columns::CompressedMade chunks_of(const columns::CompressedColumns& columns) {
+  columns::CompressedMade made{columns.layout(), {}, 0};
   for (std::size_t k = 0; k < made.layout.with_columns; ++k)
     made.chunks.push_back(columns.chunk_bytes(k));
   return made;
 }
 
 /// One object of one or several stores; each holds some columns.
-void join_object(const std::vector<const StiffnessStore*>& stores, const std::string& group,
-                 StiffnessStoreWriter& writer, StoreTotals& totals) {
-  std::vector<StiffnessFacts> facts;
-  std::vector<std::unique_ptr<ColumnSource>> sources;
+void join_object(const std::vector<const formats::StiffnessStore*>& stores,
+                 const std::string& group, formats::StiffnessStoreWriter& writer,
+                 StoreTotals& totals) {
+  std::vector<formats::StiffnessFacts> facts;
+  std::vector<std::unique_ptr<columns::ColumnSource>> sources;
   std::vector<std::uint32_t> nodes;
-  std::optional<StiffnessMatrix> matrix;
-  std::optional<Factor> factor;
-  for (const StiffnessStore* const store : stores) {
-    const StiffnessFacts f = store->facts(group);
-    StiffnessMatrix k = store->matrix(f);
-    Factor l = store->factor(f);
-    const auto same = [&](const StiffnessFacts& g) {
+  std::optional<linalg::StiffnessMatrix> matrix;
+  std::optional<linalg::Factor> factor;
+  for (const formats::StiffnessStore* const store : stores) {
+    const formats::StiffnessFacts f = store->facts(group);
+    linalg::StiffnessMatrix k = store->matrix(f);
+    linalg::Factor l = store->factor(f);
+    const auto same = [&](const formats::StiffnessFacts& g) {
       return f.hash == g.hash && f.single == g.single && f.compressed == g.compressed &&
              f.row_nodes == g.row_nodes && f.method == g.method && f.norm == g.norm &&
              f.condition == g.condition && k.value == matrix->value &&
@@ -61,7 +62,7 @@ void join_object(const std::vector<const StiffnessStore*>& stores, const std::st
     nodes.insert(nodes.end(), more.begin(), more.end());
   }
   double residual = 0;
-  for (const StiffnessFacts& f : facts)
+  for (const formats::StiffnessFacts& f : facts)
     residual = std::max(residual, f.residual);
   const std::vector<std::uint32_t> missing = writer.begin(facts.front(), *matrix, *factor, nodes);
   if (facts.front().compressed > 0) {
@@ -72,7 +73,7 @@ void join_object(const std::vector<const StiffnessStore*>& stores, const std::st
     add(totals, facts.front(), *matrix, *factor, nodes.size(), writer.end(residual));
     return;
   }
-  std::vector<double> columns(9 * rows_of(facts.front()));
+  std::vector<double> columns(9 * formats::rows_of(facts.front()));
   std::size_t k = 0; // of the missing
   for (const auto& source : sources)
     for (std::size_t i = 0; source != nullptr && i < source->nodes().size(); ++i)
@@ -86,23 +87,25 @@ void join_object(const std::vector<const StiffnessStore*>& stores, const std::st
 
 } // namespace
 
-void copy_object(const StiffnessStore& store, const std::string& group,
-                 StiffnessStoreWriter& writer, StoreTotals& totals) {
+void copy_object(const formats::StiffnessStore& store, const std::string& group,
+                 formats::StiffnessStoreWriter& writer, StoreTotals& totals) {
   join_object({&store}, group, writer, totals);
 }
 
-void copy_store(const StiffnessStore& store, StiffnessStoreWriter& writer, StoreTotals& totals) {
+void copy_store(const formats::StiffnessStore& store, formats::StiffnessStoreWriter& writer,
+                StoreTotals& totals) {
   for (const std::string& group : store.objects())
     copy_object(store, group, writer, totals);
 }
 
-void merge_stores(const std::vector<std::string>& paths, StiffnessStoreWriter& writer,
+void merge_stores(const std::vector<std::string>& paths, formats::StiffnessStoreWriter& writer,
                   StoreTotals& totals) {
-  std::vector<StiffnessStore> stores;
+  std::vector<formats::StiffnessStore> stores;
   stores.reserve(paths.size());
   for (const std::string& path : paths)
     stores.emplace_back(path);
-  std::ranges::stable_sort(stores, {}, [](const StiffnessStore& s) { return s.shard().index; });
+  std::ranges::stable_sort(stores, {},
+                           [](const formats::StiffnessStore& s) { return s.shard().index; });
   std::vector<std::string> groups;
   for (std::size_t i = 0; i < stores.size(); ++i) {
     const auto [index, count] = stores[i].shard();
@@ -125,8 +128,8 @@ void merge_stores(const std::vector<std::string>& paths, StiffnessStoreWriter& w
   std::ranges::sort(groups);
   groups.erase(std::ranges::unique(groups).begin(), groups.end());
   for (const std::string& group : groups) {
-    std::vector<const StiffnessStore*> holders;
-    for (const StiffnessStore& store : stores) {
+    std::vector<const formats::StiffnessStore*> holders;
+    for (const formats::StiffnessStore& store : stores) {
       const std::vector<std::string> names = store.objects();
       if (std::ranges::find(names, group) != names.end())
         holders.push_back(&store);
@@ -135,4 +138,4 @@ void merge_stores(const std::vector<std::string>& paths, StiffnessStoreWriter& w
   }
 }
 
-} // namespace gewebe
+} // namespace gewebe::cli

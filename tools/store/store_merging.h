@@ -7,18 +7,19 @@
 #include <string>
 #include <vector>
 
-namespace gewebe {
+namespace gewebe::cli {
 
 /// Copies one object of a store, but no second stage. \throw Error if it is damaged
-void copy_object(const StiffnessStore& store, const std::string& group,
-                 StiffnessStoreWriter& writer, StoreTotals& totals);
+void copy_object(const formats::StiffnessStore& store, const std::string& group,
+                 formats::StiffnessStoreWriter& writer, StoreTotals& totals);
 
 /// Copies all objects of a store, but no second stage. \throw Error if it is damaged
-void copy_store(const StiffnessStore& store, StiffnessStoreWriter& writer, StoreTotals& totals);
+void copy_store(const formats::StiffnessStore& store, formats::StiffnessStoreWriter& writer,
+                StoreTotals& totals);
 
 /// Joins the parts 1 to N of a store.
 /// \throw Error naming the file if a part is missing, or of another model or made otherwise
-void merge_stores(const std::vector<std::string>& paths, StiffnessStoreWriter& writer,
+void merge_stores(const std::vector<std::string>& paths, formats::StiffnessStoreWriter& writer,
                   StoreTotals& totals);
 
-} // namespace gewebe
+} // namespace gewebe::cli

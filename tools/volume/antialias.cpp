@@ -6,7 +6,7 @@
 #include <charconv>
 #include <optional>
 
-namespace gewebe {
+namespace gewebe::cli {
 namespace {
 
 constexpr int lines_instead = 4; ///< N of lines:N where exact cannot be
@@ -36,39 +36,43 @@ AntialiasChoice antialias_from_text(const std::string& text) {
       "' is unknown, expected exact, lines:N, box:N, jones, sramek or none, N 1 to 64");
 }
 
-Grid antialiased(cli::Run& run, const std::string& place, const TriangleMesh& mesh,
-                 const GridTransform& transform, const AntialiasChoice& choice,
-                 const VoxelizeOptions& options, CoverageReport& report) {
+volume::Grid antialiased(cli::Run& run, const std::string& place, const TriangleMesh& mesh,
+                         const volume::GridTransform& transform, const AntialiasChoice& choice,
+                         const voxelization::VoxelizeOptions& options,
+                         antialiasing::CoverageReport& report) {
   const Context& context = run.context();
-  const OpenMesh on_open = options.on_open;
+  const voxelization::OpenMesh on_open = options.on_open;
   std::string instead;
-  const auto volume = [&]() -> Grid {
+  const auto volume = [&]() -> volume::Grid {
     switch (choice.filter) {
     case Antialias::exact:
-      if (std::optional<Grid> grid = exact_coverage(context, mesh, transform, on_open, &report))
+      if (std::optional<volume::Grid> grid =
+              antialiasing::exact_coverage(context, mesh, transform, on_open, &report))
         return *std::move(grid);
-      instead = report.mesh.boundary_edges > 0 && on_open == OpenMesh::skip
+      instead = report.mesh.boundary_edges > 0 && on_open == voxelization::OpenMesh::skip
                     ? ""
                     : "its faces have no orientation";
       instead += (instead.empty() ? "lines:" : "; lines:") + std::to_string(lines_instead) +
                  " instead of exact";
-      return line_coverage(context, mesh, transform, lines_instead, on_open, &report);
+      return antialiasing::line_coverage(context, mesh, transform, lines_instead, on_open, &report);
     case Antialias::lines:
-      return line_coverage(context, mesh, transform, choice.count, on_open, &report);
+      return antialiasing::line_coverage(context, mesh, transform, choice.count, on_open, &report);
     case Antialias::jones:
-      return jones_density(context, mesh, transform, on_open, &report, options.rule);
+      return antialiasing::jones_density(context, mesh, transform, on_open, &report, options.rule);
     case Antialias::sramek:
-      return sramek_density(context, mesh, transform, on_open, &report, options.rule);
+      return antialiasing::sramek_density(context, mesh, transform, on_open, &report, options.rule);
     default:
       break;
     }
-    VoxelizeOptions sampled = options;
+    voxelization::VoxelizeOptions sampled = options;
     sampled.samples = choice.filter == Antialias::box ? choice.count : 1;
-    const InsideScan scan = run.timed(
-        "scan", [&] { return scan_inside(context, mesh, transform, sampled, &report.mesh); });
-    return run.timed("grid", [&] { return grid_from_scan(context, scan, transform); });
+    const voxelization::InsideScan scan = run.timed("scan", [&] {
+      return voxelization::scan_inside(context, mesh, transform, sampled, &report.mesh);
+    });
+    return run.timed("grid",
+                     [&] { return voxelization::grid_from_scan(context, scan, transform); });
   };
-  Grid grid = at(place, volume);
+  volume::Grid grid = at(place, volume);
   std::string warning = mesh_defects(report.mesh, options);
   if (!instead.empty())
     warning += (warning.empty() ? "" : "; ") + instead;
@@ -77,4 +81,4 @@ Grid antialiased(cli::Run& run, const std::string& place, const TriangleMesh& me
   return grid;
 }
 
-} // namespace gewebe
+} // namespace gewebe::cli

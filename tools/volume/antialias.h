@@ -6,7 +6,7 @@
 
 #include <string>
 
-namespace gewebe {
+namespace gewebe::cli {
 
 enum class Antialias { exact, lines, box, jones, sramek, none };
 
@@ -21,8 +21,9 @@ AntialiasChoice antialias_from_text(const std::string& text);
 
 /// The volume. Where `exact` cannot be, lines:4 take its place and `instead` says so and why; warns
 /// about open meshes. Errors name `place`.
-Grid antialiased(cli::Run& run, const std::string& place, const TriangleMesh& mesh,
-                 const GridTransform& transform, const AntialiasChoice& choice,
-                 const VoxelizeOptions& options, CoverageReport& report);
+volume::Grid antialiased(cli::Run& run, const std::string& place, const TriangleMesh& mesh,
+                         const volume::GridTransform& transform, const AntialiasChoice& choice,
+                         const voxelization::VoxelizeOptions& options,
+                         antialiasing::CoverageReport& report);
 
-} // namespace gewebe
+} // namespace gewebe::cli

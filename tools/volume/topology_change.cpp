@@ -46,7 +46,7 @@ bool may_be_nested(const TriangleMesh& mesh) {
   return false;
 }
 
-std::string topology_text(const Topology& topology) {
+std::string topology_text(const mesh::Topology& topology) {
   return std::to_string(topology.components) +
          (topology.components == 1 ? " component" : " components") + " and Euler number " +
          std::to_string(topology.euler);
@@ -55,8 +55,8 @@ std::string topology_text(const Topology& topology) {
 } // namespace
 
 void compare_topology(Run& run, const std::string& tool, const std::string& place,
-                      const std::string& option, const Topology& before, const Topology& after,
-                      const std::string& unit) {
+                      const std::string& option, const mesh::Topology& before,
+                      const mesh::Topology& after, const std::string& unit) {
   run.stats().set("components_before", before.components);
   run.stats().set("euler_before", before.euler);
   if (before == after)
@@ -71,17 +71,20 @@ FilledTopology filled_topology(const TriangleMesh& mesh) {
   FilledTopology result;
   result.welded.points = mesh.points;
   result.welded.triangles = mesh.triangles;
-  weld(result.welded, {.mode = Weld::all, .drop_degenerate = true, .drop_unused = true});
-  result.topology = topology(result.welded);
+  repair::weld(result.welded,
+               {.mode = repair::Weld::all, .drop_degenerate = true, .drop_unused = true});
+  result.topology = mesh::topology(result.welded);
   return result;
 }
 
-bool is_surface_of_volume(const Context& context, const FilledTopology& filled, VoxelRule rule) {
+bool is_surface_of_volume(const Context& context, const FilledTopology& filled,
+                          voxelization::VoxelRule rule) {
   const TriangleMesh& mesh = filled.welded;
-  if (rule == VoxelRule::zbuffer || (rule == VoxelRule::winding && may_be_nested(mesh)))
+  if (rule == voxelization::VoxelRule::zbuffer ||
+      (rule == voxelization::VoxelRule::winding && may_be_nested(mesh)))
     return false;
-  const MeshReport report = examine_mesh(mesh, context);
-  return report.closed() && report.manifold() && self_intersections(context, mesh).pairs == 0;
+  const mesh::MeshReport report = mesh::examine_mesh(mesh, context);
+  return report.closed() && report.manifold() && mesh::self_intersections(context, mesh).pairs == 0;
 }
 
 } // namespace gewebe::cli

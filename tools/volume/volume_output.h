@@ -6,7 +6,7 @@
 #include "tools/cli/cli.h"
 #include "volume/grid.h"
 
-namespace gewebe {
+namespace gewebe::cli {
 
 struct VolumeOutput {
   bool uncompressed = false;
@@ -18,9 +18,10 @@ void declare(cli::Program& program, VolumeOutput& options);
 
 /// Opens what --output names. \throw UsageError if --to or its suffix says a kind that is none of
 /// volumes
-Output open_volume(const cli::Run& run);
+formats::Output open_volume(const cli::Run& run);
 
 /// Writes and commits.
-void write(cli::Run& run, Output& output, const Grid& grid, const VolumeOutput& options);
+void write(cli::Run& run, formats::Output& output, const volume::Grid& grid,
+           const VolumeOutput& options);
 
-} // namespace gewebe
+} // namespace gewebe::cli

@@ -12,15 +12,15 @@
 #include <cstdio>
 #include <string_view>
 
-namespace gewebe {
+namespace gewebe::cli {
 
-std::vector<LabelRange> labels_from_text(const std::string& text, const char* expected) {
-  std::vector<LabelRange> labels;
+std::vector<formats::LabelRange> labels_from_text(const std::string& text, const char* expected) {
+  std::vector<formats::LabelRange> labels;
   for (std::size_t begin = 0; begin <= text.size();) {
     const std::size_t comma = std::min(text.find(',', begin), text.size());
     const std::string_view word = std::string_view(text).substr(begin, comma - begin);
     const char* const end = word.data() + word.size();
-    LabelRange& range = labels.emplace_back();
+    formats::LabelRange& range = labels.emplace_back();
     begin = comma + 1;
     if (!word.empty() && word != "list" &&
         std::string_view("-+.0123456789").find(word[0]) == std::string_view::npos) {
@@ -53,10 +53,10 @@ void list_labels(cli::Run& run, const std::string& path, const VolumeOutput& to)
     throw UsageError("--to for a list of labels, which is text, expected none");
   if (to.uncompressed)
     throw UsageError("--uncompressed for a list of labels, which is text, expected none");
-  Output output(run.output(), run.output_options(false));
-  Input input(path);
-  const LabelVolume volume =
-      run.timed("read", [&] { return read_label_volume(input, {}, run.context()); });
+  formats::Output output(run.output(), run.output_options(false));
+  formats::Input input(path);
+  const formats::LabelVolume volume =
+      run.timed("read", [&] { return formats::read_label_volume(input, {}, run.context()); });
   for (const std::string& warning : volume.warnings)
     run.warn(warning);
   const Vec3 spacing = volume.mask.transform.voxel_size();
@@ -77,15 +77,17 @@ void list_labels(cli::Run& run, const std::string& path, const VolumeOutput& to)
   run.stats().set("spacing", spacing);
 }
 
-void voxelize_labels(cli::Run& run, const std::string& path, const std::vector<LabelRange>& labels,
-                     std::optional<double> voxel, const VolumeOutput& to) {
-  Output output = open_volume(run);
-  Input input(path);
+void voxelize_labels(cli::Run& run, const std::string& path,
+                     const std::vector<formats::LabelRange>& labels, std::optional<double> voxel,
+                     const VolumeOutput& to) {
+  formats::Output output = open_volume(run);
+  formats::Input input(path);
   // What its size rules out is refused before its voxels are unpacked.
-  LabelVolume volume = run.timed("read", [&] {
-    return read_label_volume(input, labels, run.context(), [&](const LabelMask& mask) {
-      check_label_density(run.context(), mask, {voxel});
-    });
+  formats::LabelVolume volume = run.timed("read", [&] {
+    return formats::read_label_volume(input, labels, run.context(),
+                                      [&](const labels::LabelMask& mask) {
+                                        labels::check_label_density(run.context(), mask, {voxel});
+                                      });
   });
   for (const std::string& warning : volume.warnings)
     run.warn(warning);
@@ -94,10 +96,10 @@ void voxelize_labels(cli::Run& run, const std::string& path, const std::vector<L
     volume.mask.transform = other_space(volume.mask.transform);
   else
     result.space = Space::ras; // as read
-  LabelDensityReport report;
-  const Grid grid = run.timed("density", [&] {
+  labels::LabelDensityReport report;
+  const volume::Grid grid = run.timed("density", [&] {
     return at(input.name(),
-              [&] { return label_density(run.context(), volume.mask, {voxel}, &report); });
+              [&] { return labels::label_density(run.context(), volume.mask, {voxel}, &report); });
   });
   write(run, output, grid, result);
 
@@ -116,4 +118,4 @@ void voxelize_labels(cli::Run& run, const std::string& path, const std::vector<L
   cli::report_volume(run, grid);
 }
 
-} // namespace gewebe
+} // namespace gewebe::cli

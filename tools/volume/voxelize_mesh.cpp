@@ -16,25 +16,26 @@
 
 #include <cmath>
 
-namespace gewebe {
+namespace gewebe::cli {
 
 namespace {
 
 /// The lattice; with --like its space too.
-GridTransform lattice(const MeshToVoxelize& a, const Input& input, const TriangleMesh& mesh,
-                      const Context& context, Space& space) {
+volume::GridTransform lattice(const MeshToVoxelize& a, const formats::Input& input,
+                              const TriangleMesh& mesh, const Context& context, Space& space) {
   if (a.voxel)
-    return uniform_transform(*a.voxel);
+    return volume::uniform_transform(*a.voxel);
   if (a.dim)
-    return at(input.name(), [&] { return lattice_for_dim(bounding_box(mesh), *a.dim); });
-  Input like(a.like);
-  const GridTransform transform = read_volume(like, context, &space).info().transform;
+    return at(input.name(), [&] { return volume::lattice_for_dim(bounding_box(mesh), *a.dim); });
+  formats::Input like(a.like);
+  const volume::GridTransform transform =
+      formats::read_volume(like, context, &space).info().transform;
   if (!transform.is_cubic())
     throw Error(like.name(), "has " + transform.describe() + ", expected cubic voxels");
   return transform;
 }
 
-void report(cli::Run& run, const MeshToVoxelize& a, const CoverageReport& r) {
+void report(cli::Run& run, const MeshToVoxelize& a, const antialiasing::CoverageReport& r) {
   cli::Stats& stats = run.stats();
   stats.set("antialias", a.antialias);
   stats.set("triangles", r.mesh.triangles);
@@ -59,8 +60,8 @@ const char* lattice_option(const MeshToVoxelize& a) {
 
 /// Warns where parts of the mesh vanish between the voxels, closed or not. \return whether some do
 bool check_parts(cli::Run& run, const MeshToVoxelize& a, const std::string& place,
-                 const TriangleMesh& mesh, const Grid& grid) {
-  const LostParts found = find_lost_parts(mesh, grid);
+                 const TriangleMesh& mesh, const volume::Grid& grid) {
+  const voxelization::LostParts found = voxelization::find_lost_parts(mesh, grid);
   run.stats().set("parts_lost", found.lost);
   if (found.lost > 0)
     cli::distrust(run, "voxelize",
@@ -73,24 +74,25 @@ bool check_parts(cli::Run& run, const MeshToVoxelize& a, const std::string& plac
 /// Warns where walls vanish between the voxels. Whole organs of 16 voxels or more lose nothing by
 /// this measure, the edges of a tetrahedron of 30 voxels 0.3 %.
 void check_walls(cli::Run& run, const MeshToVoxelize& a, const std::string& place,
-                 const TriangleMesh& mesh, const Grid& grid) {
+                 const TriangleMesh& mesh, const volume::Grid& grid) {
   constexpr double usual = 0.005;
-  const double lost = lost_surface(mesh, grid);
+  const double lost = voxelization::lost_surface(mesh, grid);
   run.stats().set("surface_lost", lost);
   if (lost > usual)
     cli::distrust(run, "voxelize",
-                  place + ": thin walls break: " + number_text(std::round(1000 * lost) / 10) +
+                  place + ": thin walls break: " + text::number_text(std::round(1000 * lost) / 10) +
                       " % of the surface is two voxels or more away from all voxels inside, "
                       "expected a smaller voxel than by " +
                       lattice_option(a) +
-                      (a.options.rule == VoxelRule::winding
+                      (a.options.rule == voxelization::VoxelRule::winding
                            ? ""
                            : ", or --rule winding where the outermost surface is meant"));
 }
 
 /// Whether the topology is compared: with more leaves than this that takes too large a part of the
 /// run, so that only --stats is worth it.
-bool compares_topology(const cli::Run& run, const Grid& grid, const CoverageReport& r) {
+bool compares_topology(const cli::Run& run, const volume::Grid& grid,
+                       const antialiasing::CoverageReport& r) {
   constexpr std::size_t most_leaves = 1000;
   return r.mesh.boundary_edges == 0 && grid.active_voxels() > 0 &&
          (run.stats_wanted() || grid.leaves().size() <= most_leaves);
@@ -98,11 +100,11 @@ bool compares_topology(const cli::Run& run, const Grid& grid, const CoverageRepo
 
 /// Warns where the voxels are too coarse for a closed mesh. \return whether they are
 bool check_topology(cli::Run& run, const MeshToVoxelize& a, const std::string& place,
-                    const TriangleMesh& mesh, const Grid& grid) {
+                    const TriangleMesh& mesh, const volume::Grid& grid) {
   const cli::FilledTopology before = cli::filled_topology(mesh);
-  Topology after;
+  mesh::Topology after;
   try {
-    after = topology(marching_cubes(run.context(), grid).mesh);
+    after = mesh::topology(surface::marching_cubes(run.context(), grid).mesh);
   } catch (const Cancelled&) {
     throw;
   } catch (const Error& error) { // memory that the volume itself did not need
@@ -119,23 +121,23 @@ bool check_topology(cli::Run& run, const MeshToVoxelize& a, const std::string& p
 } // namespace
 
 void voxelize_mesh(cli::Run& run, const MeshToVoxelize& a) {
-  Output output = open_volume(run);
-  Input input(a.name);
-  if (is_label_volume(input.peek(4096)))
+  formats::Output output = open_volume(run);
+  formats::Input input(a.name);
+  if (formats::is_label_volume(input.peek(4096)))
     throw Error(input.name(), "is a label volume or a scan, expected a mesh, --label L or "
                               "--threshold LOW");
-  MeshReadOptions read;
-  read.kind = input_kind(input.peek(4096), a.name, run.format());
+  formats::MeshReadOptions read;
+  read.kind = formats::input_kind(input.peek(4096), a.name, run.format());
   read.unit = a.unit;
-  read.weld = weld_from_name(a.weld);
+  read.weld = formats::weld_from_name(a.weld);
   read.max_memory = run.context().max_memory;
   read.drop_unused = true; // so that they don't count for --dim
-  TriangleMesh mesh = run.timed("read", [&] { return read_mesh(input, read); });
+  TriangleMesh mesh = run.timed("read", [&] { return formats::read_mesh(input, read); });
   if (!a.transform.empty())
     at(input.name(), [&] { apply(transform_from_text(a.transform), mesh); });
   VolumeOutput to = a.output;
   Space of_lattice = to.space;
-  const GridTransform transform = lattice(a, input, mesh, run.context(), of_lattice);
+  const volume::GridTransform transform = lattice(a, input, mesh, run.context(), of_lattice);
   if (spaces_differ(to.space, of_lattice)) {
     for (Vec3& p : mesh.points)
       p = other_space(p);
@@ -145,8 +147,8 @@ void voxelize_mesh(cli::Run& run, const MeshToVoxelize& a) {
   if (of_lattice != Space::unknown)
     to.space = of_lattice;
 
-  CoverageReport counts;
-  const Grid grid = run.timed("voxelize", [&] {
+  antialiasing::CoverageReport counts;
+  const volume::Grid grid = run.timed("voxelize", [&] {
     return antialiased(run, input.name(), mesh, transform, a.choice, a.options, counts);
   });
   if (grid.active_voxels() == 0)
@@ -162,11 +164,11 @@ void voxelize_mesh(cli::Run& run, const MeshToVoxelize& a) {
         told;
   // The winding rule alone gives an open mesh walls; by others the warning of holes says more.
   if (grid.active_voxels() > 0 && !told &&
-      (counts.mesh.boundary_edges == 0 || a.options.rule == VoxelRule::winding))
+      (counts.mesh.boundary_edges == 0 || a.options.rule == voxelization::VoxelRule::winding))
     run.timed("walls", [&] { check_walls(run, a, input.name(), mesh, grid); });
   write(run, output, grid, to);
   report(run, a, counts);
   cli::report_volume(run, grid);
 }
 
-} // namespace gewebe
+} // namespace gewebe::cli

@@ -10,7 +10,7 @@
 #include <optional>
 #include <string>
 
-namespace gewebe {
+namespace gewebe::cli {
 
 struct MeshToVoxelize {
   std::string name = "-"; ///< of the mesh's file
@@ -22,11 +22,11 @@ struct MeshToVoxelize {
   std::string like;                ///< volume whose lattice is taken
   std::string antialias = "jones";
   AntialiasChoice choice; ///< what that text stands for
-  VoxelizeOptions options;
+  voxelization::VoxelizeOptions options;
   VolumeOutput output;
 };
 
 /// Reads, fills and writes it. \pre one of voxel, dim and like is given
 void voxelize_mesh(cli::Run& run, const MeshToVoxelize& a);
 
-} // namespace gewebe
+} // namespace gewebe::cli

@@ -11,11 +11,11 @@
 #include <cmath>
 #include <string_view>
 
-namespace gewebe {
+namespace gewebe::cli {
 namespace {
 
 double threshold_of(std::string_view word, const std::string& text) {
-  const std::string_view digits = without_plus(word);
+  const std::string_view digits = text::without_plus(word);
   double value = 0;
   const auto [rest, status] = std::from_chars(digits.data(), digits.data() + digits.size(), value);
   if (status != std::errc{} || rest != digits.data() + digits.size() || !std::isfinite(value))
@@ -51,9 +51,10 @@ void check_thresholds(const std::string& text, bool labels, bool own_lattice) {
 
 void voxelize_scan(cli::Run& run, const std::string& path, const Thresholds& thresholds,
                    std::optional<double> voxel, const VolumeOutput& to) {
-  Output output = open_volume(run);
-  Input input(path);
-  GreyScan scan = run.timed("read", [&] { return read_grey_volume(input, run.context()); });
+  formats::Output output = open_volume(run);
+  formats::Input input(path);
+  formats::GreyScan scan =
+      run.timed("read", [&] { return formats::read_grey_volume(input, run.context()); });
   for (const std::string& warning : scan.warnings)
     run.warn(warning);
   VolumeOutput result = to;
@@ -61,11 +62,11 @@ void voxelize_scan(cli::Run& run, const std::string& path, const Thresholds& thr
     scan.volume.transform = other_space(scan.volume.transform);
   else
     result.space = Space::ras; // as read
-  GreyDensityReport report;
-  const Grid grid = run.timed("density", [&] {
+  labels::GreyDensityReport report;
+  const volume::Grid grid = run.timed("density", [&] {
     return at(input.name(), [&] {
-      return grey_density(run.context(), scan.volume, {thresholds.low, thresholds.high, voxel},
-                          &report);
+      return labels::grey_density(run.context(), scan.volume,
+                                  {thresholds.low, thresholds.high, voxel}, &report);
     });
   });
   if (report.missing > 0)
@@ -85,4 +86,4 @@ void voxelize_scan(cli::Run& run, const std::string& path, const Thresholds& thr
   cli::report_volume(run, grid);
 }
 
-} // namespace gewebe
+} // namespace gewebe::cli

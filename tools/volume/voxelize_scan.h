@@ -7,7 +7,7 @@
 #include <optional>
 #include <string>
 
-namespace gewebe {
+namespace gewebe::cli {
 
 struct Thresholds {
   double low, high; ///< one of them may be infinite
@@ -25,4 +25,4 @@ void check_thresholds(const std::string& text, bool labels, bool own_lattice);
 void voxelize_scan(cli::Run& run, const std::string& path, const Thresholds& thresholds,
                    std::optional<double> voxel, const VolumeOutput& to);
 
-} // namespace gewebe
+} // namespace gewebe::cli
