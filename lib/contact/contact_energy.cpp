@@ -29,15 +29,15 @@ ContactEnergy::ContactEnergy(const Island& island, const StepOptions& options,
                              std::span<const Vec3> begin)
     : island_(island), parameters_(options.parameters), begin_(begin),
       d_hat_(island.activation_distance),
-      stick_(options.h > 0 ? options.parameters.stick_speed * options.h
-                           : options.parameters.stick_length * island.edge) {
+      stick_(options.h > 0 ? options.parameters.lengths.stick_speed * options.h
+                           : options.parameters.lengths.stick_length * island.edge) {
   for (std::size_t a = 0; a < island.friction.owners(); ++a)
     for (std::size_t b = 0; b < island.friction.owners(); ++b)
       rough_ = rough_ || (island.allowed.at(a, b) != 0 && island.friction.at(a, b) > 0);
 }
 
 double ContactEnergy::step_limit() const {
-  return parameters_.step_tolerance * (rough_ ? std::min(d_hat_, stick_) : d_hat_);
+  return parameters_.tolerances.step * (rough_ ? std::min(d_hat_, stick_) : d_hat_);
 }
 
 void ContactEnergy::set_stiffness(double force) {
@@ -47,10 +47,10 @@ void ContactEnergy::set_stiffness(double force) {
 }
 
 bool ContactEnergy::raise_stiffness(double force) {
-  const double wanted = stepped(parameters_.last_share * force);
+  const double wanted = stepped(parameters_.stiffness.last_share * force);
   if (!(wanted > barrier_force_))
     return false;
-  const double factor = std::min(wanted / barrier_force_, parameters_.stiffness_factor);
+  const double factor = std::min(wanted / barrier_force_, parameters_.stiffness.factor);
   barrier_force_ *= factor;
   kappa_ *= factor;
   return true;
@@ -113,7 +113,7 @@ void ContactEnergy::lag(std::span<const Vec3> x, bool damped) {
     return;
   const std::vector<FrictionPair> before = friction_;
   lag_friction(island_.surface, pairs_, x, kappa_, island_.friction, friction_);
-  align_friction(island_.surface, x, begin_, parameters_.stick_per_approach, friction_);
+  align_friction(island_.surface, x, begin_, parameters_.lengths.stick_per_approach, friction_);
   keep_duals(before, friction_);
   ++lags_;
   if (damped)
@@ -138,7 +138,7 @@ bool ContactEnergy::renew_lag(std::span<const Vec3> x, std::span<const std::uint
   for (const std::uint32_t v : vertices)
     change = std::max(change, norm(now[v] - old[v]));
   friction_residual_ = largest > 0 ? change / largest : 0;
-  if (friction_residual_ <= parameters_.friction_tolerance) {
+  if (friction_residual_ <= parameters_.tolerances.friction) {
     friction_ = std::move(before);
     return false;
   }

@@ -158,8 +158,9 @@ IslandMotion::IslandMotion(std::span<const BodySurface* const> surfaces,
   island.edge = edge > 0 ? edge : median_edge(all);
   if (!(island.edge > 0))
     island.edge = std::isfinite(smallest_radius) ? smallest_radius : 1;
-  island.activation_distance = std::min(parameters_.activation_distance * island.edge,
-                                        parameters_.activation_over_radius * smallest_radius);
+  island.activation_distance =
+      std::min(parameters_.lengths.activation_distance * island.edge,
+               parameters_.lengths.activation_over_radius * smallest_radius);
   for (double& radius : all.radius)
     if (radius > 0)
       radius -= radius_offset * island.activation_distance;

@@ -107,8 +107,8 @@ private:
   void take(CondensedSystem& system, const Step& step, double part);
   bool lower_energy(CondensedSystem& system, double contact);
   int simple_iterations() const {
-    return options_.h > 0 ? options_.parameters.gauss_newton
-                          : options_.parameters.gauss_newton_at_rest;
+    return options_.h > 0 ? options_.parameters.iterations.gauss_newton
+                          : options_.parameters.iterations.gauss_newton_at_rest;
   }
   bool iterate(CondensedSystem& system, int iteration, bool& converged);
   bool move_bodies(const CondensedSystem& system, bool ends);
@@ -163,7 +163,7 @@ double StepSolver::Work::typical_force(std::span<const Vec3> to) {
     force = 1;
   for (const std::vector<VertexForce>& of : force_)
     for (const VertexForce& f : of)
-      force = std::max(force, p.last_share * norm(f.force));
+      force = std::max(force, p.stiffness.last_share * norm(f.force));
   double stiffness = std::numeric_limits<double>::infinity();
   for (const ContactBody* const body : island_.table.bodies)
     if (const double own = body->vertex_stiffness(); own > 0)
@@ -171,7 +171,7 @@ double StepSolver::Work::typical_force(std::span<const Vec3> to) {
   if (!std::isfinite(stiffness))
     stiffness = 0;
   force = std::max(force, d_hat_ * stiffness);
-  const double stop = p.stop_share * stiffness * longest(way_);
+  const double stop = p.stiffness.stop_share * stiffness * longest(way_);
   return stop > force && !candidates_.keep_gaps(at_, to) ? stop : force;
 }
 
@@ -219,17 +219,18 @@ bool StepSolver::Work::follow_way(CondensedSystem& system, bool balanced) {
   const Parameters& p = options_.parameters;
   double reach = 1;
   Step step = take_step(system);
-  if (const double most = p.longest_step * island_.edge;
+  if (const double most = p.lengths.longest_step * island_.edge;
       !energy_.pairs().pairs.empty() && step.length > most) {
-    reach = std::max(most / step.length, p.least_reach);
+    reach = std::max(most / step.length, p.iterations.least_reach);
     system.choose_reach(reach);
     step = take_step(system);
   }
-  for (int k = 0; k < p.max_reaches && !energy_.pairs().pairs.empty() && step.free < p.full_reach;
+  for (int k = 0; k < p.iterations.reaches && !energy_.pairs().pairs.empty() &&
+                  step.free < p.iterations.full_reach;
        ++k) {
     if (!balanced)
       return false;
-    reach = std::max(reach * step.free, p.least_reach);
+    reach = std::max(reach * step.free, p.iterations.least_reach);
     system.choose_reach(reach);
     step = take_step(system);
   }
@@ -260,11 +261,11 @@ bool StepSolver::Work::lower_energy(CondensedSystem& system, double contact) {
     return -of.free * (1 - of.free / 2) * (system.slope() + of.slope);
   };
   double damping = 0, best_damping = 0, most = gain(step);
-  for (int k = 0; k < p.max_dampings && step.free < p.full_reach; ++k) {
+  for (int k = 0; k < p.iterations.dampings && step.free < p.iterations.full_reach; ++k) {
     const double size = step.length * step.length;
     const double softest = size > 0 ? -(system.slope() + step.slope) / size : 0;
-    damping =
-        damping > 0 ? p.damping_factor * damping : softest / std::max(step.free, p.least_reach);
+    damping = damping > 0 ? p.iterations.damping_factor * damping
+                          : softest / std::max(step.free, p.iterations.least_reach);
     if (!(damping > 0) || !system.solve(gradient_, damping))
       break;
     system.choose_reach(led_ ? 0 : 1);
@@ -319,9 +320,10 @@ bool StepSolver::Work::iterate(CondensedSystem& system, int iteration, bool& con
   CondensedSystem::Residual residual = system.residual(gradient_);
   const double typical = energy_.typical_force();
   const auto balances_exactly = [&](double tolerance) {
-    return residual.difference <= tolerance * std::max(residual.largest, p.small_force * typical);
+    return residual.difference <=
+           tolerance * std::max(residual.largest, p.tolerances.small_force * typical);
   };
-  converged = last_step_ <= energy_.step_limit() && balances_exactly(p.force_tolerance);
+  converged = last_step_ <= energy_.step_limit() && balances_exactly(p.tolerances.force);
   if (converged)
     return true;
   const auto balances = [&](double tolerance) {
@@ -329,16 +331,16 @@ bool StepSolver::Work::iterate(CondensedSystem& system, int iteration, bool& con
   };
   // Normal forces that do not balance are none to hold anything by friction, and the typical force
   // of an impact may be much larger than they are.
-  const bool lags = energy_.has_friction() && iteration > 0 && way_lags_ < p.max_way_lags &&
-                    balances_exactly(p.lag_tolerance);
-  const bool stiffer = balances(p.way_tolerance) && energy_.raise_stiffness(residual.largest);
+  const bool lags = energy_.has_friction() && iteration > 0 && way_lags_ < p.iterations.way_lags &&
+                    balances_exactly(p.tolerances.lag);
+  const bool stiffer = balances(p.tolerances.way) && energy_.raise_stiffness(residual.largest);
   if (lags)
-    energy_.lag(at_, way_lags_++ >= p.whole_lags);
+    energy_.lag(at_, way_lags_++ >= p.iterations.whole_lags);
   if (lags || stiffer) {
     contact = renew_gradient();
     residual = system.residual(gradient_);
   }
-  const bool balanced = balances(p.way_tolerance), near = balanced && last_step_ <= d_hat_;
+  const bool balanced = balances(p.tolerances.way), near = balanced && last_step_ <= d_hat_;
   last_step_ = std::numeric_limits<double>::infinity();
   // The exact Hessian converges fastest from near by; from afar it may be all but singular.
   const HessianMode from_afar =
@@ -356,8 +358,8 @@ bool StepSolver::Work::iterate(CondensedSystem& system, int iteration, bool& con
 bool StepSolver::Work::move_bodies(const CondensedSystem& system, bool ends) {
   find_pairs(at_);
   const Parameters& p = options_.parameters;
-  const double room =
-      std::min(p.momentum_room * d_hat_, p.momentum_gap * smallest_gap(energy_.pairs(), at_));
+  const double room = std::min(p.lengths.momentum_room * d_hat_,
+                               p.lengths.momentum_gap * smallest_gap(energy_.pairs(), at_));
   bool exact = true;
   for (std::size_t b = 0; b < island_.table.bodies.size(); ++b) {
     ContactBody& body = *island_.table.bodies[b];
@@ -431,12 +433,12 @@ bool StepSolver::Work::follow_bodies(double margin) {
 /// met something outside the searched region; else trial_ is the end
 bool StepSolver::Work::solve_round(const Round& round, double margin, bool& exact) {
   const Parameters& p = options_.parameters;
-  const std::uint64_t most = options_.h > 0 ? p.max_iterations : p.max_iterations_at_rest;
+  const std::uint64_t most = options_.h > 0 ? p.iterations.of_step : p.iterations.of_step_at_rest;
   const auto make_system = [&](std::span<const std::vector<VertexForce>> force, double share) {
     const std::span<const std::uint32_t> vertices = candidates_.vertices();
     return std::make_unique<CondensedSystem>(
         island_.table, std::vector(vertices.begin(), vertices.end()), round.start, force,
-        round.energy, share, p.ridge, inverses_, context_.cpu);
+        round.energy, share, p.stiffness.ridge, inverses_, context_.cpu);
   };
   auto system = make_system(round.force, 1);
   last_step_ = std::numeric_limits<double>::infinity();
@@ -448,7 +450,7 @@ bool StepSolver::Work::solve_round(const Round& round, double margin, bool& exac
   settled_ = true;
   while (!converged) {
     // Better models serve more than the end of this one.
-    if (system->share() == 0 && iteration >= p.round_iterations) {
+    if (system->share() == 0 && iteration >= p.iterations.of_round) {
       settled_ = false;
       break;
     }
@@ -469,11 +471,12 @@ bool StepSolver::Work::solve_round(const Round& round, double margin, bool& exac
     }
     if (done) {
       find_pairs(at_);
-      converged = !energy_.renew_lag(at_, candidates_.vertices(), round_lags_ >= p.whole_lags);
-      if (!converged && ++round_lags_ > p.max_lags)
+      converged =
+          !energy_.renew_lag(at_, candidates_.vertices(), round_lags_ >= p.iterations.whole_lags);
+      if (!converged && ++round_lags_ > p.iterations.lags)
         throw NotSolved("contact: friction did not settle");
     } else if (!candidates_.cover_own(at_, margin / 2)) {
-      if (++searches > p.max_way_searches)
+      if (++searches > p.iterations.way_searches)
         throw NotSolved("contact: bodies move farther than they were searched for");
       (void)move_bodies(*system, false);
       if (!follow_bodies(margin))
@@ -502,8 +505,8 @@ void StepSolver::Work::sharpen(double change) {
     return;
   // Rounds may alternate.
   const double rate = std::sqrt(change / changes_[changes_.size() - 3]);
-  const double rounds = std::log(p.round_tolerance * d_hat_ / change) / std::log(rate);
-  if (rate < 1 && rounds <= p.slow_rounds)
+  const double rounds = std::log(p.tolerances.round * d_hat_ / change) / std::log(rate);
+  if (rate < 1 && rounds <= p.iterations.slow_rounds)
     return;
   for (ContactBody* const body : island_.table.bodies)
     body->sharpen();
@@ -553,9 +556,9 @@ StepReport StepSolver::Work::run() {
   for (const ContactBody* const body : table.bodies)
     force_.push_back(body->last_forces());
   led_ = std::ranges::any_of(table.bodies, [](const ContactBody* b) { return b->is_led(); });
-  double margin = p.margin * island_.edge;
+  double margin = p.lengths.margin * island_.edge;
   bool may_be_alone = options_.h > 0 && !linear;
-  for (int number = 0; number < p.max_rounds; ++number) {
+  for (int number = 0; number < p.iterations.rounds; ++number) {
     if (context_.cancelled && context_.cancelled())
       throw Cancelled();
     ++report_.rounds;
@@ -585,7 +588,7 @@ StepReport StepSolver::Work::run() {
       }
       if (solve_round(round, margin, exact))
         break;
-      if (attempt >= p.max_searches)
+      if (attempt >= p.iterations.searches)
         throw NotSolved("contact: bodies move farther than they were searched for");
       margin *= 2;
       force_ = round.force;
@@ -598,13 +601,13 @@ StepReport StepSolver::Work::run() {
       find_pairs(at_);
       pair_forces_ = energy_.forces(at_);
       at_.swap(trial_);
-      if (settled_ && (linear || (number > 0 && exact && change <= p.round_tolerance * d_hat_)))
+      if (settled_ && (linear || (number > 0 && exact && change <= p.tolerances.round * d_hat_)))
         break;
       sharpen(change);
     } else {
       go_back(round, round_begin);
     }
-    if (number + 1 == p.max_rounds)
+    if (number + 1 == p.iterations.rounds)
       throw NotSolved("contact: bodies that are not linear did not come to rest in " +
                       std::to_string(number + 1) + " rounds");
   }

@@ -49,8 +49,8 @@ void SweptCandidates::search(std::span<const Vec3> from, std::span<const Vec3> t
 collision::Separation SweptCandidates::kept_gaps() const {
   // Surfaces that slide along each other meet new pairs at gaps that are smaller than d_hat: these
   // may come as near as the others.
-  return {0, parameters_.kept_gap, parameters_.kept_gap * island_.activation_distance,
-          max_advances};
+  return {0, parameters_.lengths.kept_gap,
+          parameters_.lengths.kept_gap * island_.activation_distance, max_advances};
 }
 
 double SweptCandidates::free_part(std::span<const Vec3> from, std::span<const Vec3> to) {

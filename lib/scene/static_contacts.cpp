@@ -286,7 +286,7 @@ private:
     const contact::Parameters parameters;
     const double edge = cache.motion->island().edge, nearest = cache.motion->activation_distance();
     std::vector<std::uint32_t> tiles =
-        reached(boxes_of(parts, start, to, nearest + parameters.margin * edge),
+        reached(boxes_of(parts, start, to, nearest + parameters.lengths.margin * edge),
                 w_.now.objects[parts.statics[0]].touching);
     for (bool whole = false; !whole;) {
       if (tiles.empty())

@@ -237,7 +237,7 @@ std::vector<std::size_t> separate_walls(World& w, std::span<const std::size_t> o
                                         Motions& motions) {
   SharedPlaces places(w, objects, motions);
   const double distance =
-      moved_apart * contact::Parameters{}.activation_distance * places.median_edge();
+      moved_apart * contact::Parameters{}.lengths.activation_distance * places.median_edge();
   std::set<std::size_t> moved;
   for (const std::vector<SurfaceNode>& group : places.groups()) {
     const std::vector<Vec3> directions = parting_directions(group);

@@ -158,16 +158,16 @@ double error_of(const Scene& scene, const std::vector<Vec3>& found,
 }
 
 void set_gap(contact::Parameters& p, double factor) {
-  p.activation_distance *= factor;
-  p.activation_over_radius *= factor;
+  p.lengths.activation_distance *= factor;
+  p.lengths.activation_over_radius *= factor;
 }
 void set_tolerance(contact::Parameters& p, double factor) {
-  p.step_tolerance *= factor;
-  p.force_tolerance *= factor;
-  p.friction_tolerance *= factor;
+  p.tolerances.step *= factor;
+  p.tolerances.force *= factor;
+  p.tolerances.friction *= factor;
 }
 void set_stick(contact::Parameters& p, double factor) {
-  p.stick_length *= factor;
+  p.lengths.stick_length *= factor;
 }
 
 void row(const Scene& scene, const std::string& program, std::size_t contacts, double milliseconds,

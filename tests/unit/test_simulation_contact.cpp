@@ -138,7 +138,7 @@ TEST(SimulationContact, ASphereOnASheetOfKnownCompliance) {
     const Vec3 c{0, 0, radius - down};
     // Of k down: the tolerance of forces; what moves still comes to rest, and far springs turn.
     const double exact =
-        (method == scene::Method::ffe ? contact::Parameters{}.force_tolerance : 1e-3) * k * down;
+        (method == scene::Method::ffe ? contact::Parameters{}.tolerances.force : 1e-3) * k * down;
     for (std::uint32_t i = 0; i < nodes; ++i) {
       const Vec3 rest = m.nodes[i].position;
       const double inside = radius - norm(rest - c);
@@ -206,7 +206,7 @@ TEST(SimulationContact, FrictionlessForcesAreNormalAndBalance) {
               wrong, std::abs(f[3 * std::size_t{i} + static_cast<std::size_t>(a)] - outer));
         }
     // K u = f, but for what Newton's method leaves: of the largest force on a node.
-    const double met = contact::Parameters{}.force_tolerance * largest;
+    const double met = contact::Parameters{}.tolerances.force * largest;
     EXPECT_LT(wrong, met);
     EXPECT_LT(norm(supports + sum), met * std::sqrt(static_cast<double>(forces.size())));
   }
@@ -485,8 +485,8 @@ TEST(SimulationContact, FrictionHoldsWhatRestsOnItAndNoMore) {
     const double first = at[1].y - at[0].y, second = at[2].y - at[1].y;
     if (friction > 0.3) {
       // It creeps with eps_v (1 - sqrt(1 - q)), where it needs the share q of what friction holds.
-      const double creep =
-          contact::Parameters{}.stick_speed * (1 - std::sqrt(1 - 0.3 / friction)) * duration;
+      const double creep = contact::Parameters{}.lengths.stick_speed *
+                           (1 - std::sqrt(1 - 0.3 / friction)) * duration;
       EXPECT_NEAR(first, creep, 0.05 * creep);
       EXPECT_NEAR(second, creep, 0.05 * creep);
     } else {

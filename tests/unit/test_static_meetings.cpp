@@ -36,9 +36,9 @@ using namespace test;
 /// balance to force_tolerance of the largest one, which is but a tenth of what presses a face of
 /// ten or more vertices. With friction also its last change, all around the edge of a face alike.
 constexpr contact::Parameters contact_parameters;
-constexpr double balance_met = 1e-5 + 0.1 * contact_parameters.force_tolerance;
+constexpr double balance_met = 1e-5 + 0.1 * contact_parameters.tolerances.force;
 constexpr double friction_met =
-    contact_parameters.friction_tolerance + 2 * contact_parameters.force_tolerance;
+    contact_parameters.tolerances.friction + 2 * contact_parameters.tolerances.force;
 
 Vec3 torque_of_forces(const scene::Simulation& s, std::size_t object) {
   Vec3 sum;

@@ -88,8 +88,8 @@ public:
     found.cost = cost_;
     // The gap by the narrow cells, since most edges of the block are far away and long.
     contact::Parameters parameters;
-    parameters.activation_distance = 1;
-    parameters.activation_over_radius = gap * cell_ / ball;
+    parameters.lengths.activation_distance = 1;
+    parameters.lengths.activation_over_radius = gap * cell_ / ball;
     PressedBody pressed(model_, *solver_, {ball, {}, 0}, {{0, 0, 1.001 * ball}, {}}, parameters);
     bool solved = false;
     found.cost.solve = timing::processor_milliseconds([&] {
