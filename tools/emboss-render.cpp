@@ -58,13 +58,13 @@ std::vector<formats::Kind> output_kinds() {
 
 /// The frames to draw: of a result, or one shape from all sides.
 std::vector<std::int64_t> drawn_frames(const cli::RenderArguments& a, const formats::Input& input) {
-  if (!a.frames.empty()) {
+  if (!a.film.frames.empty()) {
     if (a.reading.kind != formats::Kind::hdf5)
       throw UsageError(input.name(), "--frames for no result of a run, expected --frames absent");
-    return cli::result_frames(input, a.frames);
+    return cli::result_frames(input, a.film.frames);
   }
   std::vector<std::int64_t> frames;
-  const std::int64_t count = std::max(a.turn.value_or(1), a.turn_light.value_or(1));
+  const std::int64_t count = std::max(a.film.turn.value_or(1), a.film.turn_light.value_or(1));
   for (std::int64_t n = 0; n < count; ++n)
     frames.push_back(n);
   return frames;
@@ -74,7 +74,7 @@ void draw(cli::Run& run, cli::RenderArguments& a, formats::Input& input, cli::Pi
   const std::vector<std::int64_t> frames = drawn_frames(a, input);
   if (a.reading.kind == formats::Kind::hdf5)
     take_field(run, a, input,
-               a.frames.empty() ? std::vector{a.reading.frame.value_or(-1)} : frames);
+               a.film.frames.empty() ? std::vector{a.reading.frame.value_or(-1)} : frames);
   sink.expect(frames.size());
   cli::Pictures pictures(run, a);
   cli::SurfaceLegends legends(a, input);
@@ -82,13 +82,13 @@ void draw(cli::Run& run, cli::RenderArguments& a, formats::Input& input, cli::Pi
   texture::Image picture;
   std::vector<shading::Surface> surfaces;
   for (const std::int64_t frame : frames) {
-    if (!a.frames.empty())
+    if (!a.film.frames.empty())
       a.reading.frame = frame;
-    if (!a.frames.empty() || surfaces.empty())
+    if (!a.film.frames.empty() || surfaces.empty())
       surfaces =
           run.timed("read", [&] { return read(run, input, a.reading, a.drawing.occlusion > 0); });
     picture = pictures.of(surfaces);
-    const std::int64_t shown = a.frames.empty() ? a.reading.frame.value_or(-1) : frame;
+    const std::int64_t shown = a.film.frames.empty() ? a.reading.frame.value_or(-1) : frame;
     const bool same = legends.draw(picture, pictures.camera(), shown) && pictures.kept();
     digest.add(picture.values);
     run.timed("write", [&] { sink.put(picture, same, frame); });
@@ -102,13 +102,13 @@ void work(cli::Run& run, cli::RenderArguments a) {
   const formats::Kind to =
       formats::output_kind(run.to(), run.output(), formats::Kind::png, output_kinds());
   const bool film = contains(formats::film_kinds(), to), scene = contains(cli::scene_kinds(), to);
-  if (a.rate && !film)
+  if (a.film.rate && !film)
     throw UsageError("--fps for " + std::string(formats::kind_name(to)) + ", expected mp4 or webm");
-  const bool sequence = !a.frames.empty() || a.turn || a.turn_light;
+  const bool sequence = !a.film.frames.empty() || a.film.turn || a.film.turn_light;
   const bool many = sequence && !film && run.output().find('%') != std::string::npos;
   std::optional<cli::PictureSink> sink;
   if (!scene)
-    sink.emplace(run, to, many, a.rate.value_or(25));
+    sink.emplace(run, to, many, a.film.rate.value_or(25));
   formats::Input input(a.surface);
   a.reading.kind = formats::input_kind(input.peek(4096), a.surface, run.format());
   check_kind(a, input, a.reading.kind);

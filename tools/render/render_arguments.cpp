@@ -34,10 +34,10 @@ std::vector<std::string> words_of(const std::string& list) {
 using Layers = std::array<std::pair<const char*, RenderLayer*>, 4>;
 
 Layers layers_of(RenderArguments& a) {
-  return {{{"texture", &a.base},
-           {"detail", &a.detail},
-           {"reflection", &a.reflection},
-           {"structure", &a.structure}}};
+  return {{{"texture", &a.layers.base},
+           {"detail", &a.layers.detail},
+           {"reflection", &a.layers.reflection},
+           {"structure", &a.layers.structure}}};
 }
 
 RenderLayer& layer_of(const Layers& layers, const std::string& option, const std::string& name) {
@@ -104,37 +104,37 @@ void complete_modes(RenderArguments& a) {
       "--backend cpu)";
   const bool shaded = a.drawing.rest || a.drawing.wet;
   refuse(shaded && a.picture.backend == render::Backend::gl &&
-             a.picture.gl.mode != gl::GlMode::shader && a.words.compare.empty(),
+             a.picture.gl.mode != gl::GlMode::shader && a.view_words.compare.empty(),
          "--passes " + a.words.passes + fixed);
-  if (a.words.compare.empty())
+  if (a.view_words.compare.empty())
     return;
-  a.compare = words_of(a.words.compare);
-  for (const std::string& mode : a.compare)
+  a.film.compare = words_of(a.view_words.compare);
+  for (const std::string& mode : a.film.compare)
     refuse(mode != "cpu" &&
                std::ranges::find(gl::gl_mode_names(), mode) == gl::gl_mode_names().end(),
            "--compare: '" + mode + "' is no mode, expected 3, 2, 1, shader or cpu");
-  for (const std::string& mode : a.compare)
+  for (const std::string& mode : a.film.compare)
     refuse(shaded && mode != "cpu" && mode != "shader", "--compare: " + mode + fixed);
 }
 
 /// What was not said: a picture to show, or the formula alone.
 void complete_light(RenderArguments& a) {
-  const bool lines = a.style == "wireframe", plain = a.words.plain;
-  a.drawing.shade = a.words.shade.value_or(plain || lines ? 0 : 0.75);
-  a.drawing.fill = a.words.fill.value_or(plain || a.endoscope ? 0 : 0.35);
-  a.tissue_colors = !a.words.color && !plain && !lines;
+  const bool lines = a.look.style == "wireframe", plain = a.words.plain;
+  a.drawing.shade = a.view_words.shade.value_or(plain || lines ? 0 : 0.75);
+  a.drawing.fill = a.view_words.fill.value_or(plain || a.look.endoscope ? 0 : 0.35);
+  a.look.tissue_colors = !a.view_words.color && !plain && !lines;
   const double gray = lines && !plain ? 0.1 : 1;
-  a.common.color = a.words.color.value_or(Vec3{gray, gray, gray});
+  a.common.color = a.view_words.color.value_or(Vec3{gray, gray, gray});
   constexpr Vec3 cavity{0.15, 0.05, 0.04};
-  a.common.background = a.words.background.value_or(plain         ? Vec3{1, 1, 1}
-                                                    : a.endoscope ? cavity
-                                                                  : Vec3{0.8, 0.8, 0.8});
+  a.common.background = a.view_words.background.value_or(plain              ? Vec3{1, 1, 1}
+                                                         : a.look.endoscope ? cavity
+                                                                            : Vec3{0.8, 0.8, 0.8});
   const bool smooth = plain || a.words.msaa != 1; // by other means, or not at all
   a.picture.supersample = static_cast<std::uint32_t>(a.words.supersample.value_or(smooth ? 1 : 2));
 }
 
 void complete_clip(RenderArguments& a) {
-  const std::vector<double>& w = a.words.clip;
+  const std::vector<double>& w = a.view_words.clip;
   if (w.empty())
     return;
   a.reading.clip = tetrahedra::ClipPlane{{w[0], w[1], w[2]}, {w[3], w[4], w[5]}};
@@ -160,21 +160,22 @@ void complete(RenderArguments& a) {
          "--uv-sharpness for another mapping, expected --uv triplanar");
   if (a.words.uv_sharpness)
     a.common.rest.sharpness = static_cast<int>(*a.words.uv_sharpness);
-  refuse(a.offset_texels && has_solid_structure(a),
+  refuse(a.look.offset_texels && has_solid_structure(a),
          "--offset-texels for a solid structure, which has none, expected --offset");
   if (a.words.uv != "auto" && a.words.uv != "triplanar")
     a.mapping.mapping = shading::uv_mapping_from_name(a.words.uv);
-  refuse(a.light && a.words.light_direction, "--light and --light-direction, expected one of them");
-  if (a.words.light_direction) {
-    a.light = a.words.light_direction;
+  refuse(a.look.light && a.view_words.light_direction,
+         "--light and --light-direction, expected one of them");
+  if (a.view_words.light_direction) {
+    a.look.light = a.view_words.light_direction;
     a.drawing.directional = true;
-    refuse(norm(*a.light) == 0, "--light-direction: expected another vector than 0");
+    refuse(norm(*a.look.light) == 0, "--light-direction: expected another vector than 0");
   }
   complete_field(a);
   complete_legend(a);
-  refuse(a.no_instruments && a.instrument_color,
+  refuse(a.look.no_instruments && a.look.instrument_color,
          "--instrument-color with --no-instruments, expected one of them");
-  refuse(!a.frames.empty() && a.reading.frame.has_value(),
+  refuse(!a.film.frames.empty() && a.reading.frame.has_value(),
          "--frame and --frames, expected one of them");
   std::vector<std::string> inputs{a.surface};
   for (const auto& [word, layer] : layers_of(a))
@@ -192,37 +193,41 @@ void declare_textures(Program& p, RenderArguments& a) {
   const auto path_of = [&a](RenderLayer RenderMaterial::*layer) {
     return [&a, layer](std::int32_t n) -> std::string& { return (a.materials[n].*layer).path; };
   };
-  p.option("--texture", a.base.path, "[N=]FILE",
+  p.option("--texture", a.layers.base.path, "[N=]FILE",
            "colours: PNG, PNM, noise[:key=value,...] or veins[:...]; N=: for material N")
       .numbered(path_of(&RenderMaterial::base));
-  p.option("--detail", a.detail.path, "[N=]FILE", "colours that are added")
+  p.option("--detail", a.layers.detail.path, "[N=]FILE", "colours that are added")
       .numbered(path_of(&RenderMaterial::detail));
-  p.option("--reflection", a.reflection.path, "[N=]FILE", "colours that a moist surface mirrors")
+  p.option("--reflection", a.layers.reflection.path, "[N=]FILE",
+           "colours that a moist surface mirrors")
       .numbered(path_of(&RenderMaterial::reflection));
-  p.option("--structure", a.structure.path, "[N=]FILE",
+  p.option("--structure", a.layers.structure.path, "[N=]FILE",
            "heights to emboss: brightness of an image, noise or veins")
       .numbered(path_of(&RenderMaterial::structure));
-  p.option("--by", a.words.by, "WORD", "what N counts: material, part, object")
+  p.option("--by", a.view_words.by, "WORD", "what N counts: material, part, object")
       .one_of(shading::group_by_names());
   p.option("--sphere", a.words.sphere, "LIST",
            "textures seen as in a mirror: texture, detail, reflection, structure, none");
   p.option("--filter", a.words.filter, "WORD", "nearest, linear, mipmap; or TEXTURE=WORD,...");
   p.option("--wrap", a.words.wrap, "WORD", "repeat, clamp, mirror; or TEXTURE=WORD,...");
-  p.option("--offset", a.offset, "D", "shift of the heights in texture coordinates").range(-1, 1);
-  p.option("--offset-texels", a.offset_texels, "N", "the same in pixels of the structure");
-  p.option("--light", a.light, "X,Y,Z",
+  p.option("--offset", a.look.offset, "D", "shift of the heights in texture coordinates")
+      .range(-1, 1);
+  p.option("--offset-texels", a.look.offset_texels, "N", "the same in pixels of the structure");
+  p.option("--light", a.look.light, "X,Y,Z",
            "position of the light in mm; default: above the camera, left");
-  p.option("--light-direction", a.words.light_direction, "X,Y,Z", "vector to a light far away");
-  p.option("--shade", a.words.shade, "K", "share of Lambert's law, 0 to 1 (default 0.75)")
+  p.option("--light-direction", a.view_words.light_direction, "X,Y,Z",
+           "vector to a light far away");
+  p.option("--shade", a.view_words.shade, "K", "share of Lambert's law, 0 to 1 (default 0.75)")
       .range(0, 1);
-  p.option("--fill", a.words.fill, "F", "strength of the second light, 0 to 1 (default 0.35)")
+  p.option("--fill", a.view_words.fill, "F", "strength of the second light, 0 to 1 (default 0.35)")
       .range(0, 1);
   p.flag("--plain", a.words.plain, "relief alone: no shade, white on white, one sample per pixel");
-  p.option("--color", a.words.color, "[N=]R,G,B",
+  p.option("--color", a.view_words.color, "[N=]R,G,B",
            "colour, 0 to 1 each; default: that of the material, 1,1,1 with an image")
       .range(0, 1)
       .numbered([&a](std::int32_t n) -> std::optional<Vec3>& { return a.materials[n].color; });
-  p.option("--background", a.words.background, "R,G,B", "0 to 1 (default 0.8,0.8,0.8)").range(0, 1);
+  p.option("--background", a.view_words.background, "R,G,B", "0 to 1 (default 0.8,0.8,0.8)")
+      .range(0, 1);
   p.option("--uv", a.words.uv, "MAP",
            "auto (the mesh's coordinates, else box), box, sphere, cylinder, triplanar")
       .one_of({"auto", "box", "sphere", "cylinder", "triplanar"});
@@ -239,9 +244,9 @@ void declare_textures(Program& p, RenderArguments& a) {
 void declare(Program& p, RenderArguments& a) {
   declare_textures(p, a);
   declare_lighting(p, a);
-  p.option("--style", a.style, "STYLE", "textured, flat (facets), wireframe")
+  p.option("--style", a.look.style, "STYLE", "textured, flat (facets), wireframe")
       .one_of({"textured", "flat", "wireframe"});
-  p.option("--crease", a.crease, "DEG", "edges that turn by more than this are sharp")
+  p.option("--crease", a.look.crease, "DEG", "edges that turn by more than this are sharp")
       .range(0, 180);
   declare_camera(p, a);
   p.option("--backend", a.words.backend, "NAME", "gl, cpu; auto: gl on a graphics card")
@@ -255,22 +260,25 @@ void declare(Program& p, RenderArguments& a) {
       .range(1, 2);
   p.option("--tbn", a.words.tbn, "WHERE", "where the light is transformed: vertex, pixel, auto")
       .one_of({"auto", "vertex", "pixel"});
-  p.option("--compare", a.words.compare, "MODES", "modes side by side, such as 3,2,1,shader,cpu");
-  p.option("--clip", a.words.clip, "X,Y,Z,NX,NY,NZ",
+  p.option("--compare", a.view_words.compare, "MODES",
+           "modes side by side, such as 3,2,1,shader,cpu");
+  p.option("--clip", a.view_words.clip, "X,Y,Z,NX,NY,NZ",
            "cut solids open by a plane; remove the side that the direction points to")
       .count(6);
   p.option("--object", a.reading.object, "NAME", "draw this object of a result alone");
-  p.flag("--no-instruments", a.no_instruments, "draw no instruments of a result");
-  p.option("--instrument-color", a.instrument_color, "R,G,B",
+  p.flag("--no-instruments", a.look.no_instruments, "draw no instruments of a result");
+  p.option("--instrument-color", a.look.instrument_color, "R,G,B",
            "colour of instruments, 0 to 1 each (default 0.75,0.77,0.8)")
       .range(0, 1);
   p.option("--frame", a.reading.frame, "K",
            "frame of a result from 0; -1, the default, is the last")
       .range(-1, 1e15);
-  p.option("--frames", a.frames, "A:B:STEP", "a picture of each of these frames, or all");
-  p.option("--fps", a.rate, "N", "pictures per second of a film (default 25)").range(0.1, 1000);
-  p.option("--turn", a.turn, "N", "the camera goes around once in N pictures").range(1, 100000);
-  p.option("--turn-light", a.turn_light, "N", "the light goes around once in N pictures")
+  p.option("--frames", a.film.frames, "A:B:STEP", "a picture of each of these frames, or all");
+  p.option("--fps", a.film.rate, "N", "pictures per second of a film (default 25)")
+      .range(0.1, 1000);
+  p.option("--turn", a.film.turn, "N", "the camera goes around once in N pictures")
+      .range(1, 100000);
+  p.option("--turn-light", a.film.turn_light, "N", "the light goes around once in N pictures")
       .range(1, 100000);
   p.option("--unit", a.reading.unit, "UNIT", "unit of the mesh: m, cm, mm")
       .one_of(surface_unit_names());

@@ -16,10 +16,10 @@ void refuse(bool wrong, const std::string& what) {
 } // namespace
 
 void declare_camera(Program& p, RenderArguments& a) {
-  p.option("--view", a.words.view, "SIDE",
+  p.option("--view", a.view_words.view, "SIDE",
            "front (if no --eye), back, left, right, top, bottom, iso")
       .one_of(shading::view_names());
-  p.option("--orbit", a.words.orbit, "AZ,EL", "degrees to walk around to the right, and up")
+  p.option("--orbit", a.view_words.orbit, "AZ,EL", "degrees to walk around to the right, and up")
       .count(2);
   p.option("--distance", a.camera.distance, "MM", "distance of the camera; default: all is visible")
       .positive();
@@ -27,7 +27,7 @@ void declare_camera(Program& p, RenderArguments& a) {
   p.option("--target", a.camera.target, "X,Y,Z",
            "point in the middle of the picture; default: middle at rest");
   p.option("--up", a.camera.up, "X,Y,Z", "direction up; default: z (top and bottom: y)");
-  p.option("--fov", a.words.fov, "DEG",
+  p.option("--fov", a.view_words.fov, "DEG",
            "angle across the shorter side, with --endoscope 70 (default 30)")
       .range(1, 170);
   p.option("--size", a.words.size, "WxH", "pixels of the picture, N for a square");
@@ -38,13 +38,14 @@ void declare_camera(Program& p, RenderArguments& a) {
 }
 
 void complete_camera(RenderArguments& a) {
-  refuse(a.camera.eye && (!a.words.view.empty() || a.camera.distance),
+  refuse(a.camera.eye && (!a.view_words.view.empty() || a.camera.distance),
          "--eye with --view or --distance, expected one way to place the camera");
-  if (!a.words.view.empty())
-    a.camera.view = a.words.view;
-  a.camera.fov = a.words.fov.value_or(a.endoscope ? shading::endoscope_fov : a.camera.fov);
-  a.camera.azimuth = a.words.orbit[0];
-  a.camera.elevation = a.words.orbit[1];
+  if (!a.view_words.view.empty())
+    a.camera.view = a.view_words.view;
+  a.camera.fov =
+      a.view_words.fov.value_or(a.look.endoscope ? shading::endoscope_fov : a.camera.fov);
+  a.camera.azimuth = a.view_words.orbit[0];
+  a.camera.elevation = a.view_words.orbit[1];
   refuse(!(std::abs(a.camera.azimuth) <= 3600 && std::abs(a.camera.elevation) <= 90),
          "--orbit: expected an azimuth up to 3600 and an elevation from -90 to 90 degrees");
   try {

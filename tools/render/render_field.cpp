@@ -21,11 +21,11 @@ void declare_field(Program& p, RenderArguments& a) {
 void complete_field(RenderArguments& a) {
   if (a.reading.field.empty())
     return;
-  for (const auto* const path :
-       {&a.base.path, &a.detail.path, &a.reflection.path, &a.structure.path})
+  for (const auto* const path : {&a.layers.base.path, &a.layers.detail.path,
+                                 &a.layers.reflection.path, &a.layers.structure.path})
     if (!path->empty() || !a.materials.empty())
       throw UsageError("--field with a texture or colours of materials, expected one of them");
-  if (a.style == "wireframe" || a.words.color)
+  if (a.look.style == "wireframe" || a.view_words.color)
     throw UsageError("--field with --style wireframe or --color, which have colours of their own, "
                      "expected one of them");
   if (a.reading.field != "material") {
@@ -34,7 +34,7 @@ void complete_field(RenderArguments& a) {
   }
   if (a.words.plain || !a.volume.ramp.empty() || !a.volume.range.empty())
     throw UsageError("--field material with --plain, --ramp or --range, expected none of them");
-  a.field_material = true; // what is drawn without textures
+  a.look.field_material = true; // what is drawn without textures
   a.reading.field.clear();
 }
 

@@ -10,23 +10,23 @@
 namespace gewebe::cli {
 
 void declare_legend(Program& p, RenderArguments& a) {
-  p.option("--legend", a.words.legend, "WHEN",
+  p.option("--legend", a.view_words.legend, "WHEN",
            "colours and range, length in mm, time: on, off; auto: with --field, from 200 pixels")
       .one_of({"auto", "on", "off"});
 }
 
 void complete_legend(RenderArguments& a) {
   const bool room = std::min(a.picture.width, a.picture.height) >= texture::least_legend_side;
-  const bool asked = a.words.legend == "on";
+  const bool asked = a.view_words.legend == "on";
   if (asked && !room)
     throw UsageError("--legend for a picture of less than " +
                      std::to_string(texture::least_legend_side) +
                      " pixels, expected a larger --size");
-  if (asked && !a.compare.empty())
+  if (asked && !a.film.compare.empty())
     throw UsageError(
         "--legend with --compare, which has pictures side by side, expected one of them");
-  a.legend =
-      asked || (a.words.legend == "auto" && room && !a.reading.field.empty() && a.compare.empty());
+  a.legend = asked || (a.view_words.legend == "auto" && room && !a.reading.field.empty() &&
+                       a.film.compare.empty());
 }
 
 SurfaceLegends::SurfaceLegends(const RenderArguments& a, const formats::Input& input)
@@ -64,7 +64,7 @@ void draw_volume_legend(texture::Image& picture, const RenderArguments& a,
   texture::Legend legend;
   legend.bar = texture::LegendBar{"value", range, ramp};
   legend.mm_per_pixel = mm_per_pixel;
-  texture::draw_legend(picture, legend, a.words.background.value_or(Vec3{}));
+  texture::draw_legend(picture, legend, a.view_words.background.value_or(Vec3{}));
 }
 
 } // namespace gewebe::cli

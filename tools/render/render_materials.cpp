@@ -40,13 +40,14 @@ std::set<std::int32_t> numbers_of(const std::vector<shading::Surface>& surfaces,
 } // namespace
 
 void complete_materials(RenderArguments& a) {
-  if (a.materials.empty() && a.words.by != "material")
+  if (a.materials.empty() && a.view_words.by != "material")
     throw UsageError("--by without a number before a texture or colour, expected such as "
                      "--texture 1=FILE");
-  a.drawing.group_by = shading::group_by_from_name(a.words.by);
+  a.drawing.group_by = shading::group_by_from_name(a.view_words.by);
   for (auto& [number, material] : a.materials) {
     a.drawing.groups.push_back(number);
-    const RenderLayers of_all{&a.base, &a.detail, &a.reflection, &a.structure};
+    const RenderLayers of_all{&a.layers.base, &a.layers.detail, &a.layers.reflection,
+                              &a.layers.structure};
     for (std::size_t n = 0; n < layers.size(); ++n) {
       RenderLayer& layer = material.*layers[n];
       layer.options = of_all[n]->options;
@@ -56,7 +57,7 @@ void complete_materials(RenderArguments& a) {
 }
 
 bool has_solid_structure(const RenderArguments& a) {
-  return a.structure.solid || std::ranges::any_of(a.materials, [](const auto& material) {
+  return a.layers.structure.solid || std::ranges::any_of(a.materials, [](const auto& material) {
            return material.second.structure.solid.has_value();
          });
 }
@@ -76,7 +77,7 @@ void add_group_materials(texture::SurfaceMaterial& common, const RenderArguments
   std::vector<texture::SurfaceMaterial> others;
   for (const auto& [number, material] : a.materials) {
     texture::SurfaceMaterial& own = others.emplace_back(common);
-    if (!a.frames.empty() || used.contains(number)) // a cut shows what lies inside
+    if (!a.film.frames.empty() || used.contains(number)) // a cut shows what lies inside
       take_textures(own,
                     {&material.base, &material.detail, &material.reflection, &material.structure},
                     context);
@@ -88,16 +89,16 @@ void add_group_materials(texture::SurfaceMaterial& common, const RenderArguments
 
 void take_instruments(RenderArguments& a, const formats::Input& input) {
   if (a.reading.kind != formats::Kind::hdf5) {
-    if (a.no_instruments || a.instrument_color)
+    if (a.look.no_instruments || a.look.instrument_color)
       throw UsageError(input.name(),
                        "--instrument-color or --no-instruments for no result of a run, "
                        "expected neither");
     return;
   }
   constexpr std::size_t smooth = 128, coarse = 32;
-  if (!a.no_instruments && a.reading.object.empty() && input.name() != "-" &&
+  if (!a.look.no_instruments && a.reading.object.empty() && input.name() != "-" &&
       !formats::read_result_index(input.name()).instruments.empty())
-    a.reading.ring = a.style == "textured" ? smooth : coarse;
+    a.reading.ring = a.look.style == "textured" ? smooth : coarse;
 }
 
 void add_instrument_material(texture::SurfaceMaterial& common, const RenderArguments& a,
@@ -106,7 +107,8 @@ void add_instrument_material(texture::SurfaceMaterial& common, const RenderArgum
     return;
   constexpr Vec3 steel{0.75, 0.77, 0.8};
   texture::SurfaceMaterial own;
-  own.color = a.instrument_color.value_or(a.style == "wireframe" ? a.common.color : steel);
+  own.color =
+      a.look.instrument_color.value_or(a.look.style == "wireframe" ? a.common.color : steel);
   own.background = common.background;
   own.film = film_of(a, nullptr);
   own.film.reflectance = texture::steel_reflectance;
@@ -134,7 +136,7 @@ bool takes_tissue_color(const texture::SurfaceMaterial& common) {
 
 TissueColors::TissueColors(const RenderArguments& a, const std::vector<shading::Surface>& surfaces,
                            texture::SurfaceMaterial& common, shading::DrawingOptions& drawing) {
-  if (!a.tissue_colors || surfaces.empty())
+  if (!a.look.tissue_colors || surfaces.empty())
     return;
   for (const shading::Surface& surface : surfaces)
     of_surfaces_.push_back(texture::tissue_colors(surface.mesh, surface.materials));
@@ -147,9 +149,10 @@ TissueColors::TissueColors(const RenderArguments& a, const std::vector<shading::
     auto own = common.others.begin();
     for (const auto& [number, material] : a.materials) {
       const auto n = static_cast<std::size_t>(number);
-      const bool object = a.words.by == "object" && n < surfaces.size() && !surfaces[n].instrument;
+      const bool object =
+          a.view_words.by == "object" && n < surfaces.size() && !surfaces[n].instrument;
       if (!material.color && takes_tissue_color(*own))
-        own->color = object ? color(n, 0) : a.words.by == "part" ? common.color : color(0, n);
+        own->color = object ? color(n, 0) : a.view_words.by == "part" ? common.color : color(0, n);
       ++own;
     }
     return;

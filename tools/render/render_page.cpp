@@ -85,13 +85,13 @@ void refuse_options(const RenderArguments& a, formats::Kind to) {
 
 std::vector<std::int64_t> frames_of(const RenderArguments& a, const formats::Input& input) {
   if (a.reading.kind != formats::Kind::hdf5) {
-    if (!a.frames.empty())
+    if (!a.film.frames.empty())
       throw UsageError(input.name(), "--frames for no result of a run, expected --frames absent");
     return {};
   }
   if (a.reading.frame)
     return result_frames(input, std::to_string(*a.reading.frame));
-  return result_frames(input, a.frames.empty() ? "all" : a.frames);
+  return result_frames(input, a.film.frames.empty() ? "all" : a.film.frames);
 }
 
 /// The field that the command line names is there, and has its range.
@@ -130,8 +130,8 @@ void set_view(const RenderArguments& a, formats::ShownScene& scene) {
   view.up = camera.up;
   view.fov = a.camera.fov;
   view.background = a.common.background;
-  view.endoscope = a.endoscope;
-  view.reach = a.reach;
+  view.endoscope = a.look.endoscope;
+  view.reach = a.look.reach;
   if (a.reading.clip)
     view.clip = {a.reading.clip->point, a.reading.clip->normal};
   scene.box = box;

@@ -20,16 +20,18 @@ texture::SurfaceMaterial material_of(const RenderArguments& a,
                                      const Context& context) {
   texture::SurfaceMaterial material = a.common;
   material.film = film_of(a, nullptr);
-  take_textures(material, {&a.base, &a.detail, &a.reflection, &a.structure}, context);
+  take_textures(material,
+                {&a.layers.base, &a.layers.detail, &a.layers.reflection, &a.layers.structure},
+                context);
   add_group_materials(material, a, surfaces, context);
   return material;
 }
 
 std::vector<render::PictureOptions> options_of(const RenderArguments& a) {
-  if (a.compare.empty())
+  if (a.film.compare.empty())
     return {a.picture};
   std::vector<render::PictureOptions> all;
-  for (const std::string& mode : a.compare) {
+  for (const std::string& mode : a.film.compare) {
     render::PictureOptions options = a.picture;
     options.backend = mode == "cpu" ? render::Backend::cpu : render::Backend::gl;
     if (mode != "cpu")
@@ -61,21 +63,21 @@ void Pictures::start(const std::vector<shading::Surface>& surfaces) {
   material_ = run_.timed("textures", [&] { return material_of(a, surfaces, run_.context()); });
   box_ = shading::rest_box(surfaces);
   camera_ = camera_of(0);
-  drawing_.light = a.light.value_or(shading::default_light(*camera_));
-  if (a.endoscope)
-    drawing_.full_distance = a.reach.value_or(norm(camera_->eye - camera_->target));
+  drawing_.light = a.look.light.value_or(shading::default_light(*camera_));
+  if (a.look.endoscope)
+    drawing_.full_distance = a.look.reach.value_or(norm(camera_->eye - camera_->target));
   first_light_ = drawing_.light;
-  drawing_.occlusion_radius = a.occlusion_radius.value_or(box_.longest_side() / 4);
-  drawing_.offset = {a.offset, a.offset};
+  drawing_.occlusion_radius = a.look.occlusion_radius.value_or(box_.longest_side() / 4);
+  drawing_.offset = {a.look.offset, a.look.offset};
   const auto structured =
       std::ranges::find_if(material_.others, [](const texture::SurfaceMaterial& material) {
         return material.structure.has_value();
       });
   if (const texture::SurfaceMaterial& material =
           material_.structure || structured == material_.others.end() ? material_ : *structured;
-      a.offset_texels && material.structure)
-    drawing_.offset = {*a.offset_texels / material.structure->width(),
-                       *a.offset_texels / material.structure->height()};
+      a.look.offset_texels && material.structure)
+    drawing_.offset = {*a.look.offset_texels / material.structure->width(),
+                       *a.look.offset_texels / material.structure->height()};
   tissue_.emplace(a, surfaces, material_, drawing_);
   add_inside_material(material_, a);
   add_instrument_material(material_, a, drawing_);
@@ -90,8 +92,8 @@ void Pictures::start(const std::vector<shading::Surface>& surfaces) {
 shading::Camera Pictures::camera_of(std::uint64_t number) const {
   const RenderArguments& a = arguments_;
   shading::CameraOptions options = a.camera;
-  if (a.turn)
-    options.azimuth += 360.0 * static_cast<double>(number) / static_cast<double>(*a.turn);
+  if (a.film.turn)
+    options.azimuth += 360.0 * static_cast<double>(number) / static_cast<double>(*a.film.turn);
   return shading::make_camera(options, box_, a.picture.width, a.picture.height);
 }
 
@@ -101,10 +103,10 @@ bool Pictures::place(std::uint64_t number) {
   const Vec3 eye = drawing_.camera.eye, light = drawing_.light;
   camera_ = camera_of(number);
   drawing_.camera = *camera_;
-  if (a.endoscope)
+  if (a.look.endoscope)
     drawing_.light = shading::endoscope_light(*camera_);
-  if (a.turn_light) {
-    const double part = static_cast<double>(number) / static_cast<double>(*a.turn_light);
+  if (a.film.turn_light) {
+    const double part = static_cast<double>(number) / static_cast<double>(*a.film.turn_light);
     drawing_.light = rotated_light(first_light_, *camera_, part, drawing_.directional);
   }
   return drawing_.camera.eye != eye || drawing_.light != light;
@@ -112,12 +114,12 @@ bool Pictures::place(std::uint64_t number) {
 
 std::vector<shading::Surface> Pictures::styled(std::vector<shading::Surface> surfaces) const {
   for (shading::Surface& surface : surfaces) {
-    if (arguments_.style == "flat")
+    if (arguments_.look.style == "flat")
       surface = shading::faceted(surface);
-    if (arguments_.style == "wireframe")
+    if (arguments_.look.style == "wireframe")
       surface = shading::wireframe(surface, *camera_, 1.25, arguments_.picture.height);
   }
-  if (arguments_.inside)
+  if (arguments_.look.inside)
     surfaces = shading::two_sided(std::move(surfaces), camera_->eye);
   return surfaces;
 }
@@ -141,8 +143,8 @@ std::optional<shading::DrawingChange> Pictures::take(std::vector<shading::Surfac
     return pictures_ > 1 && surfaces_.size() == surfaces.size() &&
            std::equal(surfaces_.begin(), surfaces_.end(), surfaces.begin(), same);
   };
-  if (arguments_.style != "textured" ||
-      arguments_.inside) { // made of the points, and of the camera
+  if (arguments_.look.style != "textured" ||
+      arguments_.look.inside) { // made of the points, and of the camera
     const bool same =
         pictures_ > 1 && plain_.size() == surfaces.size() &&
         std::equal(surfaces.begin(), surfaces.end(), plain_.begin(),
@@ -179,8 +181,8 @@ std::optional<shading::DrawingChange> Pictures::take(std::vector<shading::Surfac
 
 const texture::Image& Pictures::of(std::vector<shading::Surface> surfaces) {
   for (shading::Surface& surface : surfaces)
-    if (arguments_.crease && !surface.instrument)
-      surface = shading::creased(surface, *arguments_.crease);
+    if (arguments_.look.crease && !surface.instrument)
+      surface = shading::creased(surface, *arguments_.look.crease);
   if (modes_.empty())
     start(surfaces);
   tissue_->number_materials(surfaces);
@@ -208,7 +210,7 @@ const texture::Image& Pictures::of(std::vector<shading::Surface> surfaces) {
     }
     images.push_back(
         run_.timed("draw", [&] { return mode.painter->paint(*drawing, *camera_, &mode.report); }));
-    if (arguments_.endoscope)
+    if (arguments_.look.endoscope)
       shading::look_through_endoscope(images.back(), *camera_);
     if (pictures_ == 1 && !mode.report.gl_failure.empty())
       run_.warn(mode.report.gl_failure + "; drawn without OpenGL (--backend cpu)");
@@ -229,7 +231,7 @@ void Pictures::tell_groups(const shading::Drawing& drawing) {
   run_.stats().set("triangles_by_look", counts);
   for (std::size_t g = 1; g <= drawing_.groups.size(); ++g)
     if (counts[g] == 0)
-      run_.warn("no triangle is of " + arguments_.words.by + " " +
+      run_.warn("no triangle is of " + arguments_.view_words.by + " " +
                 std::to_string(drawing_.groups[g - 1]));
 }
 

@@ -94,7 +94,8 @@ void complete_volume(RenderArguments& a) {
   if (!v.range.empty() && !(v.range[0] < v.range[1]))
     throw UsageError("--range: expected two values, the smaller one first");
   if (v.view.axis != shading::VolumeAxis::view &&
-      (a.camera.eye || !a.words.view.empty() || a.camera.azimuth != 0 || a.camera.elevation != 0))
+      (a.camera.eye || !a.view_words.view.empty() || a.camera.azimuth != 0 ||
+       a.camera.elevation != 0))
     throw UsageError("--view, --orbit or --eye for an axis, expected the axis view");
 }
 
@@ -109,22 +110,23 @@ void check_kind(const RenderArguments& a, const formats::Input& input, formats::
                         : "--slice, --maximum, --translucent, --ramp or --range for no volume, "
                           "expected none of "
                           "them (--ramp and --range with --field too)");
-  refuse(field || a.field_material, input, "--field for a volume, expected --ramp alone");
+  refuse(field || a.look.field_material, input, "--field for a volume, expected --ramp alone");
   refuse(a.drawing.texcoords || a.drawing.sphere || !a.materials.empty(), input,
          "a texture for a volume, expected --ramp or none");
-  refuse(a.style != "textured" || !a.compare.empty() || a.words.backend == "gl" ||
+  refuse(a.look.style != "textured" || !a.film.compare.empty() || a.words.backend == "gl" ||
              a.picture.samples != 1,
          input, "--style, --compare, --backend gl or --msaa for a volume, expected none of them");
-  refuse(a.light || a.words.shade || a.words.fill || a.words.plain, input,
+  refuse(a.look.light || a.view_words.shade || a.view_words.fill || a.words.plain, input,
          "a light, --shade, --fill or --plain for a volume, expected none");
-  refuse(a.drawing.wet || a.drawing.occlusion > 0 || a.inside || a.endoscope, input,
+  refuse(a.drawing.wet || a.drawing.occlusion > 0 || a.look.inside || a.look.endoscope, input,
          "--wet, --occlusion, --inside or --endoscope for a volume, which has no surface, expected "
          "none of them");
-  refuse(a.crease.has_value(), input, "--crease for a volume, which has no edges, expected none");
+  refuse(a.look.crease.has_value(), input,
+         "--crease for a volume, which has no edges, expected none");
   refuse(a.reading.clip.has_value(), input,
          "--clip for a volume, expected a tetrahedral mesh (mc-opt --tets makes one)");
   refuse(!a.reading.unit.empty() || !a.reading.object.empty() || a.reading.frame ||
-             !a.frames.empty(),
+             !a.film.frames.empty(),
          input, "--unit, --object or --frame for a volume, expected none of them");
 }
 
@@ -174,7 +176,7 @@ texture::Image volume_picture(Run& run, const RenderArguments& a, formats::Input
     max = min + 1;
   }
   texture::Image image = texture::shrunk(
-      translucent ? composed(view, a.words.background.value_or(Vec3{}))
+      translucent ? composed(view, a.view_words.background.value_or(Vec3{}))
                   : texture::colored(view.values, view.width, view.height, min, max, ramp),
       finer);
   draw_volume_legend(image, a, ramp, {min, max}, 2 * view.half_width / image.width);

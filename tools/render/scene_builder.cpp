@@ -27,12 +27,12 @@ public:
         tissue_(texture::tissue_colors(surface.mesh, surface.materials)) {}
   Vec3 of(std::int32_t material) const {
     if (surface_.instrument)
-      return arguments_.instrument_color.value_or(steel);
+      return arguments_.look.instrument_color.value_or(steel);
     if (const auto own = arguments_.materials.find(material);
         own != arguments_.materials.end() && own->second.color)
       return *own->second.color;
-    if (arguments_.words.color)
-      return *arguments_.words.color;
+    if (arguments_.view_words.color)
+      return *arguments_.view_words.color;
     if (const auto found = tissue_.find(material); found != tissue_.end())
       return found->second;
     const auto number = static_cast<std::size_t>(material);
