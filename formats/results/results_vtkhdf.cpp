@@ -64,39 +64,60 @@ private:
   std::optional<List> begin_;
 };
 
+struct VtkHdfGroups {
+  std::optional<hdf5::Group> root, of_points, of_cells, steps, point_steps, cell_steps;
+};
+
+/// Values of all parts, one part behind the other, and how many each has.
+struct VtkHdfTracks {
+  std::optional<Track> points, nodes, ends, types, displacement, material, object;
+  std::optional<List> point_count, cell_count, node_count;
+};
+
+/// By frame.
+struct VtkHdfFrames {
+  std::optional<hdf5::Dataset> times;
+  std::optional<List> part, part_count, first_point, first_cell, first_node;
+};
+
 class VtkHdfWriter final : public ResultWriter {
 public:
   VtkHdfWriter(const std::string& path, const Output::Options& options)
       : output_(path, with_sync(options)) {
     in_place([&] {
       file_.emplace(hdf5::File::create_with_checkpoints(output_.temporary()));
-      root_.emplace(file_->root().create_group("VTKHDF"));
+      groups_.root.emplace(file_->root().create_group("VTKHDF"));
       const std::array<std::int64_t, 2> version{2, 0};
-      root_->set("Version", std::span<const std::int64_t>(version));
-      root_->set("Type", "UnstructuredGrid");
-      points_.emplace(*root_, "Points", hdf5::Number::float64, 3);
-      nodes_.emplace(*root_, "Connectivity", hdf5::Number::int64, 1);
-      ends_.emplace(*root_, "Offsets", hdf5::Number::int64, 1);
-      types_.emplace(*root_, "Types", hdf5::Number::uint8, 1);
-      of_points_.emplace(root_->create_group("PointData"));
-      of_cells_.emplace(root_->create_group("CellData"));
-      steps_.emplace(root_->create_group("Steps"));
-      point_steps_.emplace(steps_->create_group("PointDataOffsets"));
-      cell_steps_.emplace(steps_->create_group("CellDataOffsets"));
-      displacement_.emplace(*of_points_, *point_steps_, "displacement", hdf5::Number::float64, 3);
-      material_.emplace(*of_cells_, *cell_steps_, "material", hdf5::Number::int32, 1);
-      object_.emplace(*of_cells_, *cell_steps_, "object", hdf5::Number::int32, 1);
-      for (std::optional<List>* const list : {&point_count_, &cell_count_, &node_count_})
-        list->emplace(*root_, list == &point_count_  ? "NumberOfPoints"
-                              : list == &cell_count_ ? "NumberOfCells"
-                                                     : "NumberOfConnectivityIds");
-      steps_->set("NSteps", std::int64_t{0});
-      times_.emplace(steps_->create_growing("Values", hdf5::Number::float64, {}, 512));
-      part_.emplace(*steps_, "PartOffsets");
-      part_count_.emplace(*steps_, "NumberOfParts");
-      first_point_.emplace(*steps_, "PointOffsets");
-      first_cell_.emplace(*steps_, "CellOffsets", hdf5::Shape{1});
-      first_node_.emplace(*steps_, "ConnectivityIdOffsets", hdf5::Shape{1});
+      groups_.root->set("Version", std::span<const std::int64_t>(version));
+      groups_.root->set("Type", "UnstructuredGrid");
+      tracks_.points.emplace(*groups_.root, "Points", hdf5::Number::float64, 3);
+      tracks_.nodes.emplace(*groups_.root, "Connectivity", hdf5::Number::int64, 1);
+      tracks_.ends.emplace(*groups_.root, "Offsets", hdf5::Number::int64, 1);
+      tracks_.types.emplace(*groups_.root, "Types", hdf5::Number::uint8, 1);
+      groups_.of_points.emplace(groups_.root->create_group("PointData"));
+      groups_.of_cells.emplace(groups_.root->create_group("CellData"));
+      groups_.steps.emplace(groups_.root->create_group("Steps"));
+      groups_.point_steps.emplace(groups_.steps->create_group("PointDataOffsets"));
+      groups_.cell_steps.emplace(groups_.steps->create_group("CellDataOffsets"));
+      tracks_.displacement.emplace(*groups_.of_points, *groups_.point_steps, "displacement",
+                                   hdf5::Number::float64, 3);
+      tracks_.material.emplace(*groups_.of_cells, *groups_.cell_steps, "material",
+                               hdf5::Number::int32, 1);
+      tracks_.object.emplace(*groups_.of_cells, *groups_.cell_steps, "object", hdf5::Number::int32,
+                             1);
+      for (std::optional<List>* const list :
+           {&tracks_.point_count, &tracks_.cell_count, &tracks_.node_count})
+        list->emplace(*groups_.root, list == &tracks_.point_count  ? "NumberOfPoints"
+                                     : list == &tracks_.cell_count ? "NumberOfCells"
+                                                                   : "NumberOfConnectivityIds");
+      groups_.steps->set("NSteps", std::int64_t{0});
+      in_frames_.times.emplace(
+          groups_.steps->create_growing("Values", hdf5::Number::float64, {}, 512));
+      in_frames_.part.emplace(*groups_.steps, "PartOffsets");
+      in_frames_.part_count.emplace(*groups_.steps, "NumberOfParts");
+      in_frames_.first_point.emplace(*groups_.steps, "PointOffsets");
+      in_frames_.first_cell.emplace(*groups_.steps, "CellOffsets", hdf5::Shape{1});
+      in_frames_.first_node.emplace(*groups_.steps, "ConnectivityIdOffsets", hdf5::Shape{1});
     });
   }
 
@@ -122,23 +143,23 @@ public:
       if (fields_.empty() && grid::have_fields(shapes_.all()))
         begin_fields();
       const Part& part = parts_.back();
-      times_->append(std::span<const double>(&time, 1));
-      part_->append(static_cast<std::int64_t>(parts_.size()) - 1);
-      part_count_->append(1);
-      first_point_->append(part.first_point);
-      first_cell_->append(part.first_cell);
-      first_node_->append(part.first_node);
-      displacement_->begin_frame(displacement_->rows());
-      displacement_->append(grid::displacements(shapes_.all()));
-      material_->begin_frame(part.first_cell);
-      object_->begin_frame(part.first_cell);
+      in_frames_.times->append(std::span<const double>(&time, 1));
+      in_frames_.part->append(static_cast<std::int64_t>(parts_.size()) - 1);
+      in_frames_.part_count->append(1);
+      in_frames_.first_point->append(part.first_point);
+      in_frames_.first_cell->append(part.first_cell);
+      in_frames_.first_node->append(part.first_node);
+      tracks_.displacement->begin_frame(tracks_.displacement->rows());
+      tracks_.displacement->append(grid::displacements(shapes_.all()));
+      tracks_.material->begin_frame(part.first_cell);
+      tracks_.object->begin_frame(part.first_cell);
       for (auto& [field, track] : fields_) {
         track.begin_frame(track.rows());
         track.append(grid::values_of(shapes_.all(), field));
       }
       ++frames_;
       last_part_ = parts_.size() - 1;
-      steps_->replace("NSteps", static_cast<std::int64_t>(frames_));
+      groups_.steps->replace("NSteps", static_cast<std::int64_t>(frames_));
       file_->checkpoint();
     });
   }
@@ -185,19 +206,19 @@ private:
     const grid::Joined all = grid::join(shapes_.all());
     parts_.push_back({static_cast<std::int64_t>(all.points.size() / 3),
                       static_cast<std::int64_t>(all.types.size()),
-                      static_cast<std::int64_t>(all.nodes.size()), points_->rows(), types_->rows(),
-                      nodes_->rows()});
-    point_count_->append(parts_.back().points);
-    cell_count_->append(parts_.back().cells);
-    node_count_->append(parts_.back().nodes);
-    points_->append(all.points);
-    nodes_->append(all.nodes);
+                      static_cast<std::int64_t>(all.nodes.size()), tracks_.points->rows(),
+                      tracks_.types->rows(), tracks_.nodes->rows()});
+    tracks_.point_count->append(parts_.back().points);
+    tracks_.cell_count->append(parts_.back().cells);
+    tracks_.node_count->append(parts_.back().nodes);
+    tracks_.points->append(all.points);
+    tracks_.nodes->append(all.nodes);
     std::vector<std::int64_t> ends{0}; // restarts in each part
     ends.insert(ends.end(), all.ends.begin(), all.ends.end());
-    ends_->append(ends);
-    types_->append(all.types);
-    material_->append(all.material);
-    object_->append(all.object);
+    tracks_.ends->append(ends);
+    tracks_.types->append(all.types);
+    tracks_.material->append(all.material);
+    tracks_.object->append(all.object);
   }
 
   /// Frames that have none yet share rows without a number.
@@ -209,8 +230,8 @@ private:
     }
     for (const auto& some : {grid::node_fields, grid::cell_fields})
       for (const grid::Field& field : some) {
-        Track track(field.of_cells ? *of_cells_ : *of_points_,
-                    field.of_cells ? *cell_steps_ : *point_steps_, field.name,
+        Track track(field.of_cells ? *groups_.of_cells : *groups_.of_points,
+                    field.of_cells ? *groups_.cell_steps : *groups_.point_steps, field.name,
                     hdf5::Number::float64, field.components());
         const auto rows = static_cast<std::size_t>(field.of_cells ? cells : points);
         track.append(std::vector<double>(rows * field.components(),
@@ -223,11 +244,9 @@ private:
 
   Output output_;
   std::optional<hdf5::File> file_;
-  std::optional<hdf5::Group> root_, of_points_, of_cells_, steps_, point_steps_, cell_steps_;
-  std::optional<Track> points_, nodes_, ends_, types_, displacement_, material_, object_;
-  std::optional<List> point_count_, cell_count_, node_count_; ///< of parts
-  std::optional<hdf5::Dataset> times_;
-  std::optional<List> part_, part_count_, first_point_, first_cell_, first_node_; ///< of frames
+  VtkHdfGroups groups_;
+  VtkHdfTracks tracks_;
+  VtkHdfFrames in_frames_;
   std::vector<std::pair<grid::Field, Track>> fields_;
   grid::Shapes shapes_;
   bool changed_ = false; ///< since the last part

@@ -80,6 +80,28 @@ struct InverseCache::State {
 InverseCache::InverseCache() : state_(std::make_unique<State>()) {}
 InverseCache::~InverseCache() = default;
 
+/// Forces, displacements and their changes in one iteration.
+struct Iterate {
+  std::vector<Vec3> start;    ///< R0 by place
+  std::vector<Vec3> force;    ///< F by active node
+  std::vector<Vec3> pushed;   ///< W F by node
+  std::vector<Vec3> change;   ///< q by active node
+  std::vector<Vec3> response; ///< W q by node
+  std::vector<Vec3> step;     ///< by place
+};
+
+/// How far the bodies are on the way to where they would be without contact.
+struct CondensedWay {
+  std::array<Direction, 2> direction; ///< at the same share c, by all of it
+  double reach = 1;                   ///< part of c that the step is to take
+  double c = 1, energy = 0;
+};
+
+/// Of energy(): quadratic in c, F and q.
+struct EnergyTerms {
+  double ff = 0, fq = 0, qq = 0, rf = 0, rq = 0;
+};
+
 struct CondensedSystem::State {
   const BodyTable& table;
   double ridge;
@@ -91,22 +113,14 @@ struct CondensedSystem::State {
   std::vector<Block3> frames; ///< by node
   std::vector<Part> parts;
   std::vector<ActiveNode> active;
-  std::vector<Vec3> start;            ///< R0 by place
-  std::vector<Vec3> force;            ///< F by active node
-  std::vector<Vec3> pushed;           ///< W F by node
-  std::vector<Vec3> change;           ///< q by active node
-  std::vector<Vec3> response;         ///< W q by node
-  std::vector<Vec3> step;             ///< by place
-  std::array<Direction, 2> direction; ///< at the same share c, by all of it
-  double reach = 1;                   ///< part of c that the step is to take
-  double c = 1, way_energy = 0;
+  Iterate now;
+  CondensedWay way;
   CpuLevel cpu;
   std::vector<std::uint32_t> node_of_unknown;        ///< active node
   std::vector<std::array<std::uint32_t, 2>> coupled; ///< active nodes of two bodies
   VectorXd carried;                                  ///< H_af p_f of immovable vertices
   VectorXd p;
-  // Of energy(): quadratic in c, F and q.
-  double ff = 0, fq = 0, qq = 0, rf = 0, rq = 0;
+  EnergyTerms terms;
 
   State(const BodyTable& of, double with_ridge, InverseCache& with_cache, CpuLevel with_cpu)
       : table(of), ridge(with_ridge), cache(with_cache), cpu(with_cpu) {}
@@ -185,9 +199,9 @@ struct CondensedSystem::State {
     }
     for (const Node& node : nodes)
       frames.push_back(table.bodies[node.body]->frame(node.vertex));
-    pushed.resize(nodes.size());
-    response.resize(nodes.size());
-    step.resize(vertices.size());
+    now.pushed.resize(nodes.size());
+    now.response.resize(nodes.size());
+    now.step.resize(vertices.size());
   }
 
   /// Of vectors on all vertices, over the unknowns.
@@ -219,19 +233,19 @@ struct CondensedSystem::State {
         own[i] = d.p[part.unknowns[static_cast<std::size_t>(i)]];
       VectorXd q = -(part.inverse * own);
       if (moves)
-        q -= c * part.start;
+        q -= way.c * part.start;
       Index i = 0;
       for (const std::uint32_t k : part.active)
         for (int a = 0; a < 3; ++a)
           if (active[k].unknown[static_cast<std::size_t>(a)] >= 0)
-            d.change[k][a] = q[i++] - (forces ? force[k][a] : 0);
+            d.change[k][a] = q[i++] - (forces ? now.force[k][a] : 0);
     }
     respond(d.change, d.response);
   }
 
   Vec3 start_of(std::uint32_t node) const { // R0 of a node's vertex
     const Node& n = nodes[node];
-    return start[place_of_vertex[table.first[n.body] + n.vertex]];
+    return now.start[place_of_vertex[table.first[n.body] + n.vertex]];
   }
 
   /// Inverse of a body's W_aa, behind new columns.
@@ -377,12 +391,12 @@ CondensedSystem::CondensedSystem(const BodyTable& table, std::vector<std::uint32
                                  double share, double ridge, InverseCache& cache, CpuLevel cpu)
     : state_(std::make_unique<State>(table, ridge, cache, cpu)) {
   State& s = *state_;
-  s.way_energy = energy;
-  s.c = share;
+  s.way.energy = energy;
+  s.way.c = share;
   s.vertices = std::move(vertices);
   s.make_nodes();
   for (const std::uint32_t vertex : s.vertices)
-    s.start.push_back(start[vertex]);
+    s.now.start.push_back(start[vertex]);
   std::vector<std::uint32_t> pushed;
   for (std::size_t body = 0; body < forces.size(); ++body)
     for (const VertexForce& f : forces[body])
@@ -391,9 +405,9 @@ CondensedSystem::CondensedSystem(const BodyTable& table, std::vector<std::uint32
   for (std::size_t body = 0; body < forces.size(); ++body)
     for (const VertexForce& f : forces[body]) {
       const std::uint32_t place = s.place_of_vertex[table.first[body] + f.vertex];
-      s.force[s.nodes[s.node_of[place]].active] += f.force;
+      s.now.force[s.nodes[s.node_of[place]].active] += f.force;
     }
-  s.respond(s.force, s.pushed);
+  s.respond(s.now.force, s.now.pushed);
 }
 
 CondensedSystem::~CondensedSystem() = default;
@@ -436,8 +450,8 @@ void CondensedSystem::activate(std::span<const std::uint32_t> vertices) {
   for (std::size_t b = 0; b < s.parts.size(); ++b)
     if (changed[b] != 0)
       s.renew(s.parts[b]);
-  s.force.resize(s.active.size());
-  s.change.resize(s.active.size());
+  s.now.force.resize(s.active.size());
+  s.now.change.resize(s.active.size());
 }
 
 void CondensedSystem::clear_hessian() {
@@ -460,7 +474,7 @@ void CondensedSystem::add_hessian(std::span<const std::uint32_t> of,
     const Node& node = s.nodes[s.node_of[place]];
     for (std::size_t j = 0; j < k; ++j)
       s.couple(node, s.nodes[s.node_of[s.place_of_vertex[of[j]]]]);
-    const Vec3 carried = -s.c * s.start[place];
+    const Vec3 carried = -s.way.c * s.now.start[place];
     for (std::size_t a = 0; a < 3; ++a) {
       unknown[3 * k + a] = node.active == none ? -1 : s.active[node.active].unknown[a];
       way[3 * k + a] = unknown[3 * k + a] < 0 ? carried[static_cast<int>(a)] : 0;
@@ -488,13 +502,13 @@ bool CondensedSystem::solve(std::span<const Vec3> gradient, double damping) {
   s.cache.state_->matrix = s.cache.state_->hessian;
   Eigen::Map<MatrixXd> matrix = s.matrix();
   matrix.diagonal().array() += damping;
-  auto& [still, whole] = s.direction;
+  auto& [still, whole] = s.way.direction;
   whole.p = -s.carried;
   for (const Part& part : s.parts) {
     const auto count = static_cast<Index>(part.unknowns.size());
     for (Index j = 0; j < count; ++j) {
       const Index column = part.unknowns[static_cast<std::size_t>(j)];
-      whole.p[column] -= s.c * part.start[j];
+      whole.p[column] -= s.way.c * part.start[j];
       for (Index i = 0; i < count; ++i)
         matrix(part.unknowns[static_cast<std::size_t>(i)], column) += part.inverse(i, j);
     }
@@ -503,7 +517,7 @@ bool CondensedSystem::solve(std::span<const Vec3> gradient, double damping) {
   for (const ActiveNode& active : s.active)
     for (int a = 0; a < 3; ++a)
       if (const std::int32_t u = active.unknown[static_cast<std::size_t>(a)]; u >= 0)
-        still.p[u] -= s.force[s.nodes[active.node].active][a];
+        still.p[u] -= s.now.force[s.nodes[active.node].active][a];
   if (order > 0 && !s.factor())
     return false;
   s.finish(still, true, false);
@@ -514,69 +528,71 @@ bool CondensedSystem::solve(std::span<const Vec3> gradient, double damping) {
 
 void CondensedSystem::choose_reach(double reach) {
   State& s = *state_;
-  s.reach = s.c > 0 ? reach : 1;
-  const auto& [still, whole] = s.direction;
-  s.p = still.p + s.reach * whole.p;
+  s.way.reach = s.way.c > 0 ? reach : 1;
+  const auto& [still, whole] = s.way.direction;
+  s.p = still.p + s.way.reach * whole.p;
   const auto combine = [&](auto of, std::vector<gewebe::Vec3>& to) {
     for (std::size_t k = 0; k < to.size(); ++k)
-      to[k] = (still.*of)[k] + s.reach * (whole.*of)[k];
+      to[k] = (still.*of)[k] + s.way.reach * (whole.*of)[k];
   };
-  combine(&Direction::change, s.change);
-  combine(&Direction::response, s.response);
+  combine(&Direction::change, s.now.change);
+  combine(&Direction::response, s.now.response);
   for (std::size_t place = 0; place < s.vertices.size(); ++place) {
     const std::uint32_t node = s.node_of[place];
-    s.step[place] = -s.reach * s.c * s.start[place] - s.pushed[node] - s.response[node];
+    s.now.step[place] =
+        -s.way.reach * s.way.c * s.now.start[place] - s.now.pushed[node] - s.now.response[node];
   }
-  s.ff = s.fq = s.qq = s.rf = s.rq = 0;
+  s.terms.ff = s.terms.fq = s.terms.qq = s.terms.rf = s.terms.rq = 0;
   for (std::size_t k = 0; k < s.active.size(); ++k) {
     const std::uint32_t node = s.active[k].node;
     const Vec3 r0 = s.start_of(node);
-    s.rf += dot(r0, s.force[k]);
-    s.rq += dot(r0, s.change[k]);
-    s.ff += dot(s.force[k], s.pushed[node]);
-    s.fq += dot(s.force[k], s.response[node]);
-    s.qq += dot(s.change[k], s.response[node]);
+    s.terms.rf += dot(r0, s.now.force[k]);
+    s.terms.rq += dot(r0, s.now.change[k]);
+    s.terms.ff += dot(s.now.force[k], s.now.pushed[node]);
+    s.terms.fq += dot(s.now.force[k], s.now.response[node]);
+    s.terms.qq += dot(s.now.change[k], s.now.response[node]);
   }
 }
 
 const Vec3& CondensedSystem::step(std::size_t place) const {
-  return state_->step[place];
+  return state_->now.step[place];
 }
 
 double CondensedSystem::energy(double part) const {
   const State& s = *state_;
   const double stay = 1 - part;
-  double energy = 0.5 * (stay * stay * s.ff - 2 * stay * part * s.fq + part * part * s.qq);
-  if (s.reach > 0) {
-    const double c = stay * s.c;
-    energy += c * (stay * s.rf - part * s.rq) + 0.5 * s.way_energy * c * c;
+  double energy =
+      0.5 * (stay * stay * s.terms.ff - 2 * stay * part * s.terms.fq + part * part * s.terms.qq);
+  if (s.way.reach > 0) {
+    const double c = stay * s.way.c;
+    energy += c * (stay * s.terms.rf - part * s.terms.rq) + 0.5 * s.way.energy * c * c;
   }
   return energy;
 }
 
 double CondensedSystem::slope() const {
   const State& s = *state_;
-  double slope = -s.ff - s.fq;
-  if (s.reach > 0)
-    slope -= s.c * (2 * s.rf + s.rq) + s.way_energy * s.c * s.c;
+  double slope = -s.terms.ff - s.terms.fq;
+  if (s.way.reach > 0)
+    slope -= s.way.c * (2 * s.terms.rf + s.terms.rq) + s.way.energy * s.way.c * s.way.c;
   return slope;
 }
 
 void CondensedSystem::require_descent(double contact_slope) {
   State& s = *state_;
   // Newton's decrement that the step would have without the way.
-  const double descent = s.p.dot(s.hessian() * s.p) + s.qq, total = slope() + contact_slope;
-  if (s.c > 0 && s.reach > 0 && !(total <= -0.5 * descent))
-    s.way_energy += (total + descent) / (s.c * s.c);
+  const double descent = s.p.dot(s.hessian() * s.p) + s.terms.qq, total = slope() + contact_slope;
+  if (s.way.c > 0 && s.way.reach > 0 && !(total <= -0.5 * descent))
+    s.way.energy += (total + descent) / (s.way.c * s.way.c);
 }
 
 void CondensedSystem::advance(double part) {
   State& s = *state_;
-  s.c = part * s.reach < 1 ? (1 - part * s.reach) * s.c : 0;
+  s.way.c = part * s.way.reach < 1 ? (1 - part * s.way.reach) * s.way.c : 0;
   for (std::size_t k = 0; k < s.active.size(); ++k)
-    s.force[k] = (1 - part) * s.force[k] - part * s.change[k];
+    s.now.force[k] = (1 - part) * s.now.force[k] - part * s.now.change[k];
   for (std::size_t node = 0; node < s.nodes.size(); ++node)
-    s.pushed[node] = (1 - part) * s.pushed[node] - part * s.response[node];
+    s.now.pushed[node] = (1 - part) * s.now.pushed[node] - part * s.now.response[node];
 }
 
 CondensedSystem::Residual CondensedSystem::residual(std::span<const Vec3> gradient) const {
@@ -592,7 +608,7 @@ CondensedSystem::Residual CondensedSystem::residual(std::span<const Vec3> gradie
     Vec3 force;
     std::array<bool, 3> moves{};
     if (active != none) {
-      force = s.force[active];
+      force = s.now.force[active];
       for (std::size_t a = 0; a < 3; ++a)
         moves[a] = s.active[active].unknown[a] >= 0;
     }
@@ -608,14 +624,14 @@ CondensedSystem::Residual CondensedSystem::residual(std::span<const Vec3> gradie
 }
 
 double CondensedSystem::share() const {
-  return state_->c;
+  return state_->way.c;
 }
 
 std::vector<VertexForce> CondensedSystem::forces(std::size_t body) const {
   const State& s = *state_;
   std::vector<VertexForce> all;
   for (const std::uint32_t k : s.parts[body].active)
-    all.push_back({s.nodes[s.active[k].node].vertex, s.force[k]});
+    all.push_back({s.nodes[s.active[k].node].vertex, s.now.force[k]});
   std::ranges::sort(all, {}, &VertexForce::vertex);
   return all;
 }

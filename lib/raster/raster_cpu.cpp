@@ -297,12 +297,13 @@ KernelScene scene_of(const shading::Drawing& drawing, const Viewport& viewport,
     scene.frames = reinterpret_cast<const float*>(drawing.frames.data());
   scene.triangles = reinterpret_cast<const std::uint32_t*>(drawing.triangles.data());
   viewport.rows(scene.clip);
-  scene.base = textures.at(0);
-  scene.detail = textures.at(1);
-  scene.reflection = textures.at(2);
-  scene.structure = textures.at(3);
+  scene.textures.base = textures.at(0);
+  scene.textures.detail = textures.at(1);
+  scene.textures.reflection = textures.at(2);
+  scene.textures.structure = textures.at(3);
   rest.emplace(drawing, material, scene);
-  for (const KernelTexture* texture : {scene.base, scene.detail, scene.reflection, scene.structure})
+  for (const KernelTexture* texture : {scene.textures.base, scene.textures.detail,
+                                       scene.textures.reflection, scene.textures.structure})
     if (texture != nullptr) {
       scene.sphere = scene.sphere || texture->sphere;
       scene.clamped = scene.clamped || texture->wrap == 1;
@@ -310,10 +311,10 @@ KernelScene scene_of(const shading::Drawing& drawing, const Viewport& viewport,
     }
   set(scene.color, material.color);
   set(scene.light, drawing.light);
-  set(scene.eye, drawing.camera.eye);
-  set(scene.right, drawing.camera.right);
-  set(scene.up, drawing.camera.up);
-  set(scene.back, drawing.camera.back);
+  set(scene.eye.at, drawing.camera.eye);
+  set(scene.eye.right, drawing.camera.right);
+  set(scene.eye.up, drawing.camera.up);
+  set(scene.eye.back, drawing.camera.back);
   for (std::size_t a = 0; a < 2; ++a)
     scene.offset[a] = static_cast<float>(drawing.offset[a]);
   scene.directional = drawing.directional;

@@ -17,7 +17,7 @@ inline void wet(const KernelScene& scene, const Slots& slots, std::size_t at, Fl
   const KernelFilm& film = *scene.film;
   const Floats none = splat(0.0F), one = splat(1.0F);
   const Vector place = vector_at(slots.place, at);
-  const Vector eye = unit(minus(splat(scene.eye), place));
+  const Vector eye = unit(minus(splat(scene.eye.at), place));
   const Vector light =
       scene.directional ? splat(scene.light) : unit(minus(splat(scene.light), place));
   Vector normal = unit(vector_at(slots.normal, at));

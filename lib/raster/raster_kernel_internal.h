@@ -52,6 +52,15 @@ struct KernelFilm {
   float full_distance;               ///< of the light, see light_left(); 0: it doesn't fall off
 };
 
+struct KernelTextures {
+  const KernelTexture *base, *detail, *reflection, *structure; ///< null where absent
+};
+
+/// The eye's place, and the directions of its view.
+struct KernelEye {
+  float at[3], right[3], up[3], back[3];
+};
+
 /// What shading needs of the triangles from `first` on; others have another material. Vertices are
 /// 10 floats: position, s t, shifted s t, sphere s t, shade; frames 7: normal, tangent, side.
 struct KernelScene {
@@ -61,14 +70,14 @@ struct KernelScene {
   std::uint32_t first, count; ///< triangles of this material
   const KernelScene* next;    ///< other triangles with their material, or null
   double clip[3][4];          ///< rows x, y, w: to pixels times w, from the upper left
-  const KernelTexture *base, *detail, *reflection, *structure; ///< null where absent
+  KernelTextures textures;
   float color[3];
   float offset[2]; ///< of the structure along s and t
   float light[3];  ///< place, or unit direction to it
   bool directional, sphere;
   bool clamped;     ///< some texture neither repeats nor is mirrored: whole numbers count
   bool derivatives; ///< some texture shrinks by mipmaps
-  float eye[3], right[3], up[3], back[3];
+  KernelEye eye;
   const KernelFilm* film;   ///< null: dry. Else there are frames
   const KernelRest* rest;   ///< null where no texture needs it; such ones are absent above
   std::uint32_t background; ///< red, green, blue from the lowest byte

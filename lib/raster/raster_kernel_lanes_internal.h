@@ -494,7 +494,7 @@ inline void interpolate(const KernelScene& scene, const Corners& c, std::int32_t
   if constexpr (Rest)
     interpolate_rest(scene, c, row, slots, at);
   if (scene.frames == nullptr) {
-    if (scene.structure != nullptr) {
+    if (scene.textures.structure != nullptr) {
       attribute(c.vertex, 5, whole[0], slots.s2);
       attribute(c.vertex, 6, whole[1], slots.t2);
     }
@@ -507,7 +507,7 @@ inline void interpolate(const KernelScene& scene, const Corners& c, std::int32_t
   for (int axis = 0; axis < 3; ++axis) {
     attribute(c.vertex, axis, 0, slots.place[axis]);
     attribute(c.frame, axis, 0, slots.normal[axis]);
-    if (scene.structure != nullptr)
+    if (scene.textures.structure != nullptr)
       attribute(c.frame, 3 + axis, 0, slots.tangent[axis]);
   }
   store(slots.side + at, splat(c.frame[0][6]));
@@ -540,7 +540,7 @@ inline Vector splat(const float (&v)[3]) {
 inline void look_around(const KernelScene& scene, Slots& slots, std::size_t at) {
   const Vector place = vector_at(slots.place, at);
   const Vector normal = unit(vector_at(slots.normal, at));
-  if (scene.structure != nullptr) {
+  if (scene.textures.structure != nullptr) {
     const Vector raw = vector_at(slots.tangent, at);
     const Vector tangent = unit(minus(raw, scaled(normal, dot(normal, raw))));
     const Vector across{normal.y * tangent.z - normal.z * tangent.y,
@@ -553,11 +553,11 @@ inline void look_around(const KernelScene& scene, Slots& slots, std::size_t at) 
     store(slots.t2 + at, side * dot(light, across) * splat(scene.offset[1]));
   }
   if (scene.sphere) {
-    const Vector to = unit(minus(place, splat(scene.eye)));
+    const Vector to = unit(minus(place, splat(scene.eye.at)));
     const Floats twice = dot(normal, to) * splat(2.0F);
     const Vector back = minus(to, scaled(normal, twice));
-    const Floats x = dot(back, splat(scene.right)), y = dot(back, splat(scene.up)),
-                 z = dot(back, splat(scene.back)) + splat(1.0F);
+    const Floats x = dot(back, splat(scene.eye.right)), y = dot(back, splat(scene.eye.up)),
+                 z = dot(back, splat(scene.eye.back)) + splat(1.0F);
     const Floats m = splat(0.5F) * inverse_or_zero(root(x * x + y * y + z * z));
     store(slots.ms + at, x * m + splat(0.5F));
     store(slots.mt + at, y * m + splat(0.5F));
@@ -722,7 +722,7 @@ inline Colors sample_layer(const KernelTexture& texture, const Slots& slots, std
 }
 
 inline Floats relief(const KernelScene& scene, const Slots& slots, std::size_t at) {
-  const KernelTexture& structure = *scene.structure;
+  const KernelTexture& structure = *scene.textures.structure;
   const Floats s = load<Floats>((structure.sphere ? slots.ms : slots.s) + at);
   const Floats t = load<Floats>((structure.sphere ? slots.mt : slots.t) + at);
   Floats s2 = load<Floats>(slots.s2 + at), t2 = load<Floats>(slots.t2 + at);
@@ -753,8 +753,8 @@ inline Colors shade(const KernelScene& scene, Slots& slots, std::size_t at) {
   Colors color;
   for (int n = 0; n < 3; ++n)
     color.c[n] = splat(scene.color[n]) * load<Floats>(slots.shade + at);
-  if (scene.base != nullptr) {
-    const Colors base = sample_layer(*scene.base, slots, at);
+  if (scene.textures.base != nullptr) {
+    const Colors base = sample_layer(*scene.textures.base, slots, at);
     for (int n = 0; n < 3; ++n)
       color.c[n] *= base.c[n];
   } else if (Rest && rest_has(scene, &KernelRest::base)) {
@@ -772,11 +772,11 @@ inline Colors shade(const KernelScene& scene, Slots& slots, std::size_t at) {
         color.c[n] = smaller(color.c[n] + more_at_rest[n], one);
     }
   };
-  add(scene.detail, &KernelRest::detail, rest.detail);
-  add(scene.reflection, &KernelRest::reflection, rest.reflection);
+  add(scene.textures.detail, &KernelRest::detail, rest.detail);
+  add(scene.textures.reflection, &KernelRest::reflection, rest.reflection);
   const bool rest_relief = Rest && rest_has(scene, &KernelRest::structure);
   Floats twice_relief = one;
-  if (scene.structure != nullptr || rest_relief) {
+  if (scene.textures.structure != nullptr || rest_relief) {
     twice_relief = splat(2.0F) * (rest_relief ? rest.relief : relief(scene, slots, at));
     for (Floats& c : color.c)
       c = smaller(c * twice_relief, one);

@@ -24,10 +24,10 @@ RasterRest::RasterRest(const shading::Drawing& drawing, const texture::SurfaceMa
     rest_.derivatives = rest_.derivatives || there->count > 1;
     there = nullptr;
   };
-  image(material.base, scene.base, rest_.base);
-  image(material.detail, scene.detail, rest_.detail);
-  image(material.reflection, scene.reflection, rest_.reflection);
-  image(material.structure, scene.structure, rest_.structure);
+  image(material.base, scene.textures.base, rest_.base);
+  image(material.detail, scene.textures.detail, rest_.detail);
+  image(material.reflection, scene.textures.reflection, rest_.reflection);
+  image(material.structure, scene.textures.structure, rest_.structure);
   const auto solid = [&](const std::optional<texture::SolidTexture>& texture,
                          std::optional<texture::SolidPlan>& plan, KernelRestLayer& layer) {
     if (!texture)
