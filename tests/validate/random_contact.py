@@ -251,13 +251,14 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--build", default="build/release", help="folder of the programs")
     parser.add_argument("--count", type=int, default=2000)
+    parser.add_argument("--first", type=int, default=0, help="number of the first scene")
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--number", type=int, help="this scene alone")
     parser.add_argument("-j", type=int, default=1, help="scenes at a time")
     parser.add_argument("--keep", type=pathlib.Path, help="folder for the scenes that break something; with --number for that one")
     options = parser.parse_args()
     programs = pathlib.Path(options.build).resolve()
-    numbers = [options.number] if options.number is not None else range(options.count)
+    numbers = [options.number] if options.number is not None else range(options.first, options.first + options.count)
     sums, broken, time = dict.fromkeys(COUNTS, 0), 0, 0.0
     with tempfile.TemporaryDirectory() as temporary, concurrent.futures.ProcessPoolExecutor(options.j) as pool:
         work = pathlib.Path(temporary)
