@@ -27,12 +27,12 @@ struct RenderLayer {
   texture::TextureOptions options;
 };
 
-struct RenderLayers {
+struct TextureLayers {
   RenderLayer base, detail, reflection, structure;
 };
 
 /// What a material, a part or an object has for itself; the rest is as for all.
-struct RenderMaterial : RenderLayers {
+struct RenderMaterial : TextureLayers {
   std::optional<Vec3> color;
   std::optional<double> wet, wet_roughness;
 };
@@ -91,7 +91,7 @@ struct ViewWords {
 
 struct RenderArguments {
   std::string surface = "-";
-  RenderLayers layers;
+  TextureLayers layers;
   std::map<std::int32_t, RenderMaterial> materials;
   texture::SurfaceMaterial common; ///< colours; its textures are read later
   RenderLook look;
