@@ -44,12 +44,6 @@ std::vector<Kind> all_inputs() {
   return kinds;
 }
 
-void fix(Model& model, const ModelArguments& a) {
-  const auto load = [](const std::string& name) { return Input(name, false).read_all(); };
-  for (const auto node : select_nodes(model, *a.fixed, load, SelectorScope::body))
-    model.nodes[node].fixed |= *fixed_axes_from_name(a.axes);
-}
-
 void hold_step(cli::Run& run, Model& model, const ModelArguments& a) {
   if (!a.dt)
     return;
@@ -74,8 +68,7 @@ void work(cli::Run& run, ModelArguments& a) {
   Model model = cli::model_source(run, a, space);
   if (!a.name.empty())
     model.name = a.name;
-  if (a.fixed)
-    fix(model, a);
+  cli::fix_nodes(model, a);
   if (!a.fit.empty())
     cli::fit_model(run, model, a.fit);
   const bool deck = std::ranges::find(solid_deck_kinds(), to) != solid_deck_kinds().end();

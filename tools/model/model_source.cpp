@@ -91,6 +91,13 @@ Model model_source(Run& run, ModelArguments a, Space& space) {
   return model_of_surface(run, input.name(), std::move(mesh), a);
 }
 
+void fix_nodes(Model& model, const ModelArguments& a) {
+  const auto load = [](const std::string& name) { return Input(name, false).read_all(); };
+  if (a.fixed)
+    for (const auto node : select_nodes(model, *a.fixed, load, SelectorScope::body))
+      model.nodes[node].fixed |= *fixed_axes_from_name(a.axes);
+}
+
 void warn_of_laws(Run& run, const Model& model) {
   for (const Material& m : model.materials)
     if (const std::string paths = m.law ? instability_text(*m.law) : ""; !paths.empty())

@@ -9,6 +9,7 @@
 #include <cstdint>
 #include <numeric>
 #include <span>
+#include <utility>
 
 namespace gewebe {
 
@@ -45,11 +46,12 @@ std::vector<EstimateAnswer> SceneEstimates::find(const Simulation& simulation,
       made.materials = element_materials(simulation.model(i));
       made.elements = solid_elements(made.mesh, made.materials);
     }
-    const Solid& solid = solids_[i];
+    Solid& solid = solids_[i];
+    solid.energy.clear();
     const std::span<const double> u = simulation.displacement(i);
-    const std::vector<CornerTensors> stresses = solid_stresses(
+    std::vector<CornerTensors> stresses = solid_stresses(
         solid.elements, solid_strains(solid.mesh, solid.materials, solid.elements, u, gravity));
-    const StressError error = stress_error(solid.mesh, solid.elements, stresses);
+    StressError error = stress_error(solid.mesh, solid.elements, stresses);
     std::vector<double> held(u.size());
     multiply_solid(solid.mesh, solid.elements, u, held);
     const double energy = std::inner_product(u.begin(), u.end(), held.begin(), 0.0);
@@ -76,8 +78,19 @@ std::vector<EstimateAnswer> SceneEstimates::find(const Simulation& simulation,
         largest = size;
         found.stress = error.at_node[node];
       }
+    solid.energy = std::move(error.energy);
+    solid.total = energy;
+    solid.stresses = std::move(stresses);
   }
   return answers;
+}
+
+std::optional<ElementErrors> SceneEstimates::elements(std::size_t object) const {
+  const auto found = solids_.find(object);
+  if (found == solids_.end() || found->second.energy.empty())
+    return std::nullopt;
+  const Solid& solid = found->second;
+  return ElementErrors{&solid.mesh, solid.energy, solid.total, solid.elements, solid.stresses};
 }
 
 } // namespace gewebe

@@ -10,9 +10,20 @@
 
 #include <cstddef>
 #include <map>
+#include <optional>
+#include <span>
 #include <vector>
 
 namespace gewebe {
+
+/// Estimated errors of the elements of one object after the last step.
+struct ElementErrors {
+  const TetMesh* mesh = nullptr;  ///< at rest, cut as the object is
+  std::span<const double> energy; ///< as StressError::energy, one per tetrahedron
+  double total = 0;               ///< σ : ε of the body in the same unit, above 0
+  std::span<const SolidElement> elements;
+  std::span<const CornerTensors> stresses;
+};
 
 /// Keeps the elements of each solid between steps.
 class SceneEstimates {
@@ -21,11 +32,18 @@ public:
   /// \param gravity  mm/s²  \throw Error as Simulation::displacement
   std::vector<EstimateAnswer> find(const Simulation& simulation, const Vec3& gravity);
 
+  /// Errors that the last find() summed up. None where it had no estimate, or nothing is deformed.
+  /// Valid until the next find().
+  std::optional<ElementErrors> elements(std::size_t object) const;
+
 private:
   struct Solid {
     TetMesh mesh;
     std::vector<SolidMaterial> materials;
     std::vector<SolidElement> elements;
+    std::vector<double> energy; ///< errors by element, empty where nothing is deformed
+    std::vector<CornerTensors> stresses;
+    double total = 0;
   };
   std::map<std::size_t, Solid> solids_; ///< by object
 };

@@ -102,6 +102,8 @@ void SceneRun::State::answer() {
   stress.find(simulation, gravity);
   const std::vector<EstimateAnswer> estimated =
       options.estimate ? estimates.find(simulation, gravity) : std::vector<EstimateAnswer>{};
+  if (options.estimate && options.estimated)
+    options.estimated(simulation, estimates, estimated);
   answered_gravity = gravity;
   if (shared) // before the reader of the answer looks
     shared->frame(simulation, steps);
