@@ -324,6 +324,9 @@ validate: PAGE ?= $(BUILD)/validation
 ifeq ($(S),textbook)
 validate: $(TOOLS) $(PLUGIN) | $(FIRST)
 	@python3 tests/validate/textbook.py --build '$(BUILD)' --page '$(PAGE)/textbook' $(if $(QUICK),--quick) $(if $(ONLY),--only '$(ONLY)') -j $(or $(JOBS),1)
+else ifeq ($(S),accuracy)
+validate: $(TOOLS) $(PLUGIN) | $(FIRST)
+	@PATH='$(abspath $(BUILD))':"$$PATH" python3 tests/validate/accuracy.py --data '$(or $(GEWEBE_SHARED),../shared)/data' $(if $(ONLY),--only '$(ONLY)')
 else
 validate: $(VALIDATE) | $(FIRST)
 	@$(VALIDATE) '$(PAGE)' $(S)
@@ -485,7 +488,7 @@ help:
 	@echo '  golden-update  write tests/golden/expected anew and say what changed (T=NAME only that case)'
 	@echo '  stress         run the programs of tests/stress'
 	@echo '  bench          measure time against error'
-	@echo '  validate       judge the finite elements by theory, benchmarks, peers, an experiment; PAGE=FOLDER for the page, S=textbook scenes of contact'
+	@echo '  validate       judge the finite elements by theory, benchmarks, peers, an experiment; PAGE=FOLDER for the page, S=textbook scenes of contact, S=accuracy organs pressed'
 	@echo '  report         what report FZKA 7190 claims beside what is measured here; REPORT=FOLDER for the pages, PAGE=NAME, QUICK=1, BEFORE=FOLDER'
 	@echo '  html           the manual as linked pages in build/CONFIG/html, by mandoc'
 	@echo '  deb            packages for Debian 12 of the last commit in build/CONFIG/deb, seen by lintian'

@@ -44,22 +44,16 @@ std::vector<formats::Kind> all_inputs() {
   return kinds;
 }
 
-void fix(model::Model& model, const cli::ModelArguments& a) {
-  const auto load = [](const std::string& name) { return formats::Input(name, false).read_all(); };
-  for (const auto node : model::select_nodes(model, *a.fixed, load, model::SelectorScope::body))
-    model.nodes[node].fixed |= *model::fixed_axes_from_name(a.axes);
-}
-
 void hold_step(cli::Run& run, model::Model& model, const cli::ModelArguments& a) {
   if (!a.dt)
     return;
   if (a.scale_mass)
-    run.stats().set("scaled_masses", std::uint64_t{model::scale_masses(model, *a.dt)});
-  model::require_safe_step(model, *a.dt);
+    run.stats().set("scaled_masses", std::uint64_t{scale_masses(model, *a.dt)});
+  require_safe_step(model, *a.dt);
 }
 
 void report_steps(cli::Run& run, const model::Model& model) {
-  const std::vector<double> steps = model::safe_steps(model);
+  const std::vector<double> steps = safe_steps(model);
   const auto min = std::min_element(steps.begin(), steps.end());
   run.stats().set("safe_step", *min);
   run.stats().set("safe_step_node", static_cast<std::uint64_t>(min - steps.begin()));
@@ -67,16 +61,14 @@ void report_steps(cli::Run& run, const model::Model& model) {
 
 void work(cli::Run& run, cli::ModelArguments& a) {
   if (!a.materials.empty())
-    cli::choose_materials(a);
-  const formats::Kind to =
-      formats::output_kind(run.to(), run.output(), formats::Kind::ela, all_outputs());
-  formats::Output output(run.output(), run.output_options(formats::is_binary(to)));
+    choose_materials(a);
+  const formats::Kind to = output_kind(run.to(), run.output(), formats::Kind::ela, all_outputs());
+  formats::Output output(run.output(), run.output_options(is_binary(to)));
   Space space = Space::unknown;
   model::Model model = cli::model_source(run, a, space);
   if (!a.name.empty())
     model.name = a.name;
-  if (a.fixed)
-    fix(model, a);
+  cli::fix_nodes(model, a);
   if (!a.fit.empty())
     cli::fit_model(run, model, a.fit);
   const bool deck =
@@ -88,21 +80,21 @@ void work(cli::Run& run, cli::ModelArguments& a) {
   hold_step(run, model, a);
   run.timed("write", [&] {
     if (to == formats::Kind::ela)
-      formats::write_ela(output, model, run.context(), space);
+      write_ela(output, model, run.context(), space);
     else if (deck)
-      formats::write_solid_deck(output, model, to);
+      write_solid_deck(output, model, to);
     else
-      formats::write_mesh(output, model::surface_mesh(model), to);
+      write_mesh(output, surface_mesh(model), to);
   });
   output.commit();
   if (!run.stats_wanted())
     return;
-  for (const auto& [key, count] : model::model_counts(model, run.context()))
+  for (const auto& [key, count] : model_counts(model, run.context()))
     run.stats().set(key, count);
-  run.stats().set("total_mass", model::total_mass(model));
+  run.stats().set("total_mass", total_mass(model));
   if (model.tetrahedra.empty())
     report_steps(run, model);
-  run.stats().set("digest", model::model_digest(model));
+  run.stats().set("digest", model_digest(model));
 }
 
 } // namespace
@@ -110,14 +102,13 @@ void work(cli::Run& run, cli::ModelArguments& a) {
 int main(int argc, char** argv) {
   cli::Program p("exp2ela", "Turns a mesh into a deformable model.");
   cli::ModelArguments a;
-  cli::declare(p, a);
-  cli::declare_space(p, a.space);
-  cli::declare_transform(p, a.transform);
+  declare(p, a);
+  declare_space(p, a.space);
+  declare_transform(p, a.transform);
   p.output_kinds(all_outputs());
   p.input_kinds(all_inputs());
   p.operand("MESH", a.mesh, "mesh, tetrahedra or model");
-  p.check([&] { cli::complete(a); });
-  return p.run(argc, argv, [&](cli::Run& run) {
-    a.list_materials ? cli::list_materials(run, a) : work(run, a);
-  });
+  p.check([&] { complete(a); });
+  return p.run(argc, argv,
+               [&](cli::Run& run) { a.list_materials ? list_materials(run, a) : work(run, a); });
 }

@@ -220,13 +220,6 @@ private:
   std::vector<Recovered> recovered_;
 };
 
-/// s : C⁻¹ : s of an isotropic material.
-double complementary(const Elasticity& material, const linalg::SymmetricBlock& s) {
-  const double bulk = material.lambda + 2 * material.mu / 3, p = (s[0] + s[3] + s[5]) / 3;
-  const double size = von_mises(s); // 3/2 of the square of the deviator
-  return size * size / (3 * material.mu) + p * p / bulk;
-}
-
 /// Recovered minus element stress at a point of an element.
 linalg::SymmetricBlock difference_at(const Recovered& recovered, const CornerTensors& stresses,
                                      const std::array<double, 4>& l, bool quadratic) {
@@ -247,6 +240,13 @@ linalg::SymmetricBlock difference_at(const Recovered& recovered, const CornerTen
 
 } // namespace
 
+double energy_density(const Elasticity& material, const linalg::SymmetricBlock& stress) {
+  const double bulk = material.lambda + 2 * material.mu / 3;
+  const double pressure = (stress[0] + stress[3] + stress[5]) / 3;
+  const double size = von_mises(stress); // 3/2 of the square of the deviator
+  return size * size / (3 * material.mu) + pressure * pressure / bulk;
+}
+
 StressError stress_error(const tetrahedra::TetMesh& mesh, std::span<const SolidElement> elements,
                          std::span<const CornerTensors> stresses, const Context& context) {
   static const std::array<Point, point_count> points = make_points();
@@ -263,7 +263,7 @@ StressError stress_error(const tetrahedra::TetMesh& mesh, std::span<const SolidE
           difference_at(recovered[t], stresses[t], point.at, quadratic);
       const double size = von_mises(d);
       square += point.weight * size * size;
-      error.energy[t] += point.weight * complementary(elements[t].material, d);
+      error.energy[t] += point.weight * energy_density(elements[t].material, d);
     }
     error.energy[t] *= energy_share * elements[t].volume;
     for (std::size_t a = 0; a < (quadratic ? 10 : 4); ++a) {

@@ -39,6 +39,9 @@ struct DiscretisationError {
   double stress = 0;       ///< at the node of the largest von Mises stress, Pa
 };
 
+/// σ : C⁻¹ : σ of a stress, Pa: twice the energy per volume.
+double energy_density(const Elasticity& material, const linalg::SymmetricBlock& stress);
+
 /// \param stresses  of solid_stresses(), one per element \pre elements are those of the mesh
 /// The same bytes for any number of threads.
 StressError stress_error(const tetrahedra::TetMesh& mesh, std::span<const SolidElement> elements,

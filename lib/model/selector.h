@@ -58,6 +58,9 @@ Selector parse_selector(std::string_view text);
 /// The names of the node lists that it reads.
 std::vector<std::string> node_list_names(const Selector& selector);
 
+/// Whether it selects nodes by number, which are others in each mesh of a body.
+bool has_node_numbers(const Selector& selector);
+
 /// Returns the text of the node list that a selector names as @NAME. It may throw Error.
 using LoadNodeList = std::function<std::string(const std::string& name)>;
 

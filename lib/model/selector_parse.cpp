@@ -315,6 +315,12 @@ Selector parse_selector(std::string_view text) {
   return Parser(text).parse();
 }
 
+bool has_node_numbers(const Selector& selector) {
+  return std::ranges::any_of(selector.steps, [](const Selector::Step& step) {
+    return step.op == Selector::Op::nodes || step.op == Selector::Op::file;
+  });
+}
+
 std::vector<std::string> node_list_names(const Selector& selector) {
   std::vector<std::string> names;
   for (const Selector::Step& step : selector.steps)

@@ -90,7 +90,7 @@ test_programs_load_only_what_they_use() {
       gewebe) uses=' ' ;;
       metaball2vol | csg) uses=' openvdb ' ;;
       voxelize | mc-opt) uses=' openvdb assimp ' ;;
-      exp2ela) uses=' assimp cholmod ' ;; # --fit solves
+      exp2ela) uses=' assimp hdf5_serial cholmod ' ;; # --fit and --accuracy solve, and scenes may have stores
       ffe-precompute | ffe-run) uses=' hdf5_serial cholmod ' ;;
       emboss-render) uses=' assimp hdf5_serial epoxy png ' ;;
       *) fail "what may $tool load?" ;;

@@ -86,6 +86,7 @@ test_gewebe_plot() { for_release && page gewebe-plot.1; }
 test_gewebe_command() { for_release && page gewebe.1; }
 test_gewebe_serve() { for_release && page gewebe_serve.5; }
 test_gewebe_solids() { for_release && page gewebe-solids.7; }
+test_gewebe_accuracy() { for_release && page gewebe-accuracy.7; }
 test_gewebe_nets() { for_release && page gewebe-nets.7; }
 test_gewebe_cutting() { for_release && page gewebe-cutting.7; }
 test_scene() { for_release && page scene.5; }

@@ -69,6 +69,11 @@ void Run::warn(const std::string& text) {
     print_message(tool_, "warning: " + text);
 }
 
+void Run::tell(const std::string& text) {
+  if (!quiet_)
+    print_message(tool_, text);
+}
+
 void Run::say(const std::string& text) {
   if (verbose_)
     print_message(tool_, text);

@@ -83,6 +83,8 @@ public:
   void warn(const std::string& text);
   /// The program ends with this message and status 1 once all is reported, --stats too.
   void fail_at_end(const Error& error) { failure_ = error; }
+  /// `tool: text` on standard error unless -q.
+  void tell(const std::string& text);
   /// `tool: text` on standard error with -v.
   void say(const std::string& text);
 

@@ -4,6 +4,8 @@
 #include "model/check.h"
 #include "model/material_table.h"
 
+#include <charconv>
+#include <system_error>
 #include <vector>
 
 namespace gewebe::cli {
@@ -40,6 +42,29 @@ std::string checked_table(const std::string& file) {
   return text;
 }
 
+/// "5%" as 0.05.
+double share_from_percent(const std::string& text) {
+  const std::string expected = ", expected 0.1% to 50%, such as 5%";
+  double percent = 0;
+  const char* const last = text.data() + text.size();
+  const auto [end, error] = std::from_chars(text.data(), last, percent);
+  if (error != std::errc() || end + 1 != last || *end != '%' || !(percent >= 0.1 && percent <= 50))
+    throw Error("'" + text + "'" + expected);
+  return percent / 100;
+}
+
+void complete_accuracy(ModelArguments& a) {
+  AccuracyGoal& goal = a.accuracy;
+  refuse(goal.text.empty() != goal.scene.empty(),
+         "--accuracy and --for need each other, expected both");
+  refuse(goal.text.empty() && goal.max_tetrahedra, "--max-tets without --accuracy, expected both");
+  if (goal.text.empty())
+    return;
+  refuse(!a.solid, "--accuracy without --solid, expected both");
+  refuse(!a.fit.empty(), "--accuracy and --fit, expected one of them");
+  goal.error = parsed("--accuracy", [&] { return share_from_percent(goal.text); });
+}
+
 } // namespace
 
 void declare(cli::Program& p, ModelArguments& a) {
@@ -68,6 +93,12 @@ void declare(cli::Program& p, ModelArguments& a) {
   p.option("--cell", a.cell, "S", "with --solid: edge of the cells in mm").positive();
   p.option("--refine", a.refine, "SELECTOR:SIZE[;...]",
            "with --solid: cells of at most SIZE mm there, such as sphere:0,0,50,8:2");
+  p.option("--accuracy", a.accuracy.text, "PERCENT",
+           "with --solid --for: smaller cells until the estimated error is below, such as 5%");
+  p.option("--for", a.accuracy.scene, "SCENE", "with --accuracy: scene that is solved");
+  p.option("--max-tets", a.accuracy.max_tetrahedra, "N",
+           "with --accuracy: most tetrahedra (default 50000)")
+      .range(1, 1e9);
   p.option("--rule", a.rule, "RULE", "with --solid: when a point is inside: parity, winding")
       .one_of({"parity", "winding"});
   p.option("--on-open", a.on_open, "WHAT",
@@ -127,6 +158,7 @@ void complete(ModelArguments& a) {
   for (const tetrahedra::RefinedRegion& region : a.refined)
     refuse(!region.materials.empty(),
            "--refine: label is for mc-opt --tets, expected sphere, box or surface");
+  complete_accuracy(a);
   refuse(!a.solid && a.rule != ModelArguments{}.rule, "--rule without --solid, expected both");
   refuse(!a.solid && a.on_open != ModelArguments{}.on_open,
          "--on-open without --solid, expected both");
@@ -155,12 +187,16 @@ void complete(ModelArguments& a) {
     inputs.push_back(a.materials);
   if (!a.fit.empty())
     inputs.push_back(a.fit);
+  if (!a.accuracy.scene.empty())
+    inputs.push_back(a.accuracy.scene);
   if (!a.matrix && !a.list_materials)
     inputs.push_back(a.mesh);
   if (a.fix != "none") {
     a.fixed = parsed("--fix", [&] { return model::parse_selector(a.fix); });
     for (const std::string& name : model::node_list_names(*a.fixed))
       inputs.push_back(name);
+    refuse(!a.accuracy.text.empty() && has_node_numbers(*a.fixed),
+           "--fix: nodes have other numbers in each mesh of --accuracy, expected places");
   }
   cli::check_one_pipe(inputs);
 }

@@ -16,6 +16,13 @@
 
 namespace gewebe::cli {
 
+/// How accurate a solid shall be, and for what.
+struct AccuracyGoal {
+  std::string text, scene; ///< as given; the file of the scene
+  double error = 0;        ///< relative
+  std::optional<std::int64_t> max_tetrahedra;
+};
+
 struct ModelArguments {
   std::string mesh = "-", unit, weld = "auto", material = "generic", name, fix = "none",
               axes = "xyz", primitive, size, repair, materials, fit, rule = "parity",
@@ -29,6 +36,7 @@ struct ModelArguments {
   std::int64_t order = 2;     ///< of finite elements
   std::optional<double> cell; ///< of the lattice that fills a surface
   std::vector<tetrahedra::RefinedRegion> refined;
+  AccuracyGoal accuracy; ///< no text: none
   bool solid = false, no_skin = false, scale_mass = false, list_materials = false;
 };
 

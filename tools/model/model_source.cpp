@@ -35,14 +35,14 @@ model::Model model_source(Run& run, ModelArguments a, Space& space) {
       "the input is a surface, expected --solid beside --poisson, --law, --prony and --order";
   if (a.matrix) {
     refuse(!a.solid && (a.values.law || a.values.prony), for_solids);
-    model::number_parts(a.build.material, {});
-    model::require_parts(a.build.material, {});
+    number_parts(a.build.material, {});
+    require_parts(a.build.material, {});
     const double nodes = static_cast<double>(a.matrix->m) * a.matrix->n;
     require_memory(run.context(),
                    nodes * static_cast<double>(sizeof(Vec3) + 2 * sizeof(Triangle)) +
                        (a.solid ? 0 : model::model_bytes(nodes, 2 * nodes, a.build.bend)),
                    "the primitive");
-    TriangleMesh mesh = model::primitive_mesh(*a.matrix);
+    TriangleMesh mesh = primitive_mesh(*a.matrix);
     if (map)
       apply(*map, mesh);
     return model_of_surface(run, a.primitive, std::move(mesh), a);
@@ -56,8 +56,7 @@ model::Model model_source(Run& run, ModelArguments a, Space& space) {
          "the input is a model, expected a mesh for options that build one");
   if (from == formats::Kind::ela) {
     Space stated = Space::unknown;
-    model::Model model =
-        run.timed("read", [&] { return formats::read_ela(input, run.context(), &stated); });
+    model::Model model = run.timed("read", [&] { return read_ela(input, run.context(), &stated); });
     space = result_space(stated, a.space);
     Affine whole;
     if (spaces_differ(stated, space))
@@ -68,10 +67,10 @@ model::Model model_source(Run& run, ModelArguments a, Space& space) {
       at(input.name(), [&] { apply(whole, model); });
     return model;
   }
-  const bool tetrahedra = formats::holds_tetrahedra(input.peek(4096), from);
+  const bool tetrahedra = holds_tetrahedra(input.peek(4096), from);
   refuse(a.solid && tetrahedra, "--solid: the input holds tetrahedra already, expected a surface");
   if (tetrahedra) {
-    at(input.name(), [&] { model::number_parts(a.build.material, {}); });
+    at(input.name(), [&] { number_parts(a.build.material, {}); });
     return solid_source(run, input, from, a);
   }
   refuse(!a.solid && (a.values.poisson || a.values.law || a.values.prony || a.order != 2),
@@ -81,22 +80,29 @@ model::Model model_source(Run& run, ModelArguments a, Space& space) {
                                          .weld = formats::weld_from_name(a.weld),
                                          .max_memory = run.context().max_memory};
   formats::MeshReadStats read;
-  TriangleMesh mesh = run.timed("read", [&] { return formats::read_mesh(input, options, &read); });
+  TriangleMesh mesh = run.timed("read", [&] { return read_mesh(input, options, &read); });
   if (map)
     at(input.name(), [&] { apply(*map, mesh); });
   at(input.name(), [&] {
-    model::number_parts(a.build.material, read.part_names);
-    model::require_parts(a.build.material, mesh.part);
+    number_parts(a.build.material, read.part_names);
+    require_parts(a.build.material, mesh.part);
   });
   if (a.unit.empty())
     warn_of_size(run, input.name(), mesh, {});
   return model_of_surface(run, input.name(), std::move(mesh), a);
 }
 
+void fix_nodes(model::Model& model, const ModelArguments& a) {
+  const auto load = [](const std::string& name) { return formats::Input(name, false).read_all(); };
+  if (a.fixed)
+    for (const auto node : select_nodes(model, *a.fixed, load, model::SelectorScope::body))
+      model.nodes[node].fixed |= *model::fixed_axes_from_name(a.axes);
+}
+
 void warn_of_laws(Run& run, const model::Model& model) {
   for (const model::Material& m : model.materials)
-    if (const std::string paths = m.law ? model::instability_text(*m.law) : ""; !paths.empty())
-      run.warn(model.name + ": material '" + m.name + "': " + model::law_text(*m.law) +
+    if (const std::string paths = m.law ? instability_text(*m.law) : ""; !paths.empty())
+      run.warn(model.name + ": material '" + m.name + "': " + law_text(*m.law) +
                " is unstable in " + paths + ", expected smaller strains or other parameters");
 }
 

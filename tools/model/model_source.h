@@ -13,6 +13,9 @@ namespace gewebe::cli {
 /// \throw UsageError if an option says nothing of such an input; Error as the readers
 model::Model model_source(Run& run, ModelArguments a, Space& space);
 
+/// Fixes the nodes that --fix selects. \throw Error if there are none
+void fix_nodes(model::Model& model, const ModelArguments& a);
+
 /// Warns of materials whose law becomes unstable under strains, naming the smallest of them.
 void warn_of_laws(Run& run, const model::Model& model);
 

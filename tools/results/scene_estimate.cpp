@@ -9,6 +9,7 @@
 #include <cstdint>
 #include <numeric>
 #include <span>
+#include <utility>
 
 namespace gewebe::cli {
 
@@ -44,16 +45,16 @@ std::vector<formats::EstimateAnswer> SceneEstimates::find(const scene::Simulatio
       Solid& made = solids_[i];
       made.mesh = fem::element_mesh(simulation.model(i));
       made.materials = fem::element_materials(simulation.model(i));
-      made.elements = fem::solid_elements(made.mesh, made.materials);
+      made.elements = solid_elements(made.mesh, made.materials);
     }
-    const Solid& solid = solids_[i];
+    Solid& solid = solids_[i];
+    solid.energy.clear();
     const std::span<const double> u = simulation.displacement(i);
-    const std::vector<fem::CornerTensors> stresses =
-        fem::solid_stresses(solid.elements, fem::solid_strains(solid.mesh, solid.materials,
-                                                               solid.elements, u, gravity));
-    const fem::StressError error = fem::stress_error(solid.mesh, solid.elements, stresses);
+    std::vector<fem::CornerTensors> stresses = solid_stresses(
+        solid.elements, solid_strains(solid.mesh, solid.materials, solid.elements, u, gravity));
+    fem::StressError error = stress_error(solid.mesh, solid.elements, stresses);
     std::vector<double> held(u.size());
-    fem::multiply_solid(solid.mesh, solid.elements, u, held);
+    multiply_solid(solid.mesh, solid.elements, u, held);
     const double energy = std::inner_product(u.begin(), u.end(), held.begin(), 0.0);
     fem::DiscretisationError& found = answer.error.emplace();
     if (!(energy > 0))
@@ -71,15 +72,26 @@ std::vector<formats::EstimateAnswer> SceneEstimates::find(const scene::Simulatio
         farthest = std::max(farthest, norm(vector_at(u, node)));
     found.displacement = found.relative * farthest;
     const std::vector<linalg::SymmetricBlock> at_nodes =
-        fem::nodal_tensors(solid.mesh, solid.elements, stresses);
+        nodal_tensors(solid.mesh, solid.elements, stresses);
     double largest = -1;
     for (std::size_t node = 0; node < at_nodes.size(); ++node)
       if (const double size = fem::von_mises(at_nodes[node]); size > largest) {
         largest = size;
         found.stress = error.at_node[node];
       }
+    solid.energy = std::move(error.energy);
+    solid.total = energy;
+    solid.stresses = std::move(stresses);
   }
   return answers;
+}
+
+std::optional<ElementErrors> SceneEstimates::elements(std::size_t object) const {
+  const auto found = solids_.find(object);
+  if (found == solids_.end() || found->second.energy.empty())
+    return std::nullopt;
+  const Solid& solid = found->second;
+  return ElementErrors{&solid.mesh, solid.energy, solid.total, solid.elements, solid.stresses};
 }
 
 } // namespace gewebe::cli

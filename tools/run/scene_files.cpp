@@ -86,16 +86,18 @@ private:
 
 } // namespace
 
-SceneFiles scene_files(const std::string& scene, const Context& context,
-                       const std::function<void(const std::string&)>& warn) {
+std::string scene_file_path(const std::string& scene, const std::string& name) {
   const std::size_t slash = scene.find_last_of('/');
   const std::string folder =
       scene == "-" || slash == std::string::npos ? "" : scene.substr(0, slash + 1);
-  const auto resolve = [folder](const std::string& name) {
-    if (name == "-")
-      return folder + "./-"; // a file, for the pipe may be the scene's
-    return name.starts_with('/') ? name : folder + name;
-  };
+  if (name == "-")
+    return folder + "./-"; // a file, for the pipe may be the scene's
+  return name.starts_with('/') ? name : folder + name;
+}
+
+SceneFiles scene_files(const std::string& scene, const Context& context,
+                       const std::function<void(const std::string&)>& warn) {
+  const auto resolve = [scene](const std::string& name) { return scene_file_path(scene, name); };
   SceneFiles files;
   files.check = [resolve](const std::string& name) { (void)facts_of(resolve(name)); };
   const auto spaces = std::make_shared<SpaceCheck>(warn);

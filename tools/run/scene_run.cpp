@@ -77,7 +77,7 @@ void SceneRun::State::sync() {
 
 /// Also without a reader, so that a wrong question is an error everywhere.
 void SceneRun::State::tell(const formats::QueryCommand& query) {
-  const std::string text = formats::text_query(simulation, query, options.files.node_list);
+  const std::string text = text_query(simulation, query, options.files.node_list);
   if (options.reply)
     deliver([&] { options.reply(options.binary ? formats::binary_told(steps, text) : text); });
 }
@@ -106,6 +106,8 @@ void SceneRun::State::answer() {
   const std::vector<formats::EstimateAnswer> estimated =
       options.estimate ? estimates.find(simulation, gravity)
                        : std::vector<formats::EstimateAnswer>{};
+  if (options.estimate && options.estimated)
+    options.estimated(simulation, estimates, estimated);
   answered_gravity = gravity;
   if (shared) // before the reader of the answer looks
     shared->frame(simulation, steps);
@@ -113,8 +115,8 @@ void SceneRun::State::answer() {
     deliver([&] {
       const std::vector<formats::StressAnswer> stresses = stress.answers();
       const formats::AnswerFields fields{stresses, estimated};
-      options.reply(options.binary ? formats::binary_answer(simulation, steps, fields)
-                                   : formats::text_answer(simulation, steps, fields));
+      options.reply(options.binary ? binary_answer(simulation, steps, fields)
+                                   : text_answer(simulation, steps, fields));
     });
   if (options.events != nullptr) {
     for (const scene::Cutting& c : simulation.news().cuttings)

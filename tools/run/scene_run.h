@@ -12,16 +12,19 @@
 #include <functional>
 #include <memory>
 #include <optional>
+#include <span>
 #include <string>
 #include <string_view>
 
 namespace gewebe::formats {
 class SharedShapes;
+struct EstimateAnswer;
 } // namespace gewebe::formats
 
 namespace gewebe::cli {
 
 class EventLog;
+class SceneEstimates;
 class SceneRecord;
 class StepLatency;
 
@@ -46,6 +49,9 @@ struct SceneFiles {
   /// Writes a model whole or not at all. May be absent. \throw Error
   std::function<void(const std::string& name, const model::Model& model)> write_model;
 };
+
+/// Path of a file that a scene names, see scene_files().
+std::string scene_file_path(const std::string& scene, const std::string& name);
 
 /// From files; relative names count from the folder of `scene`, or from the working folder where
 /// that is "-".
@@ -74,7 +80,11 @@ struct SceneOptions {
   bool measure = false;       ///< digest and largest displacement
   bool measure_error = false; ///< of every shape
   bool estimate = false;      ///< answers have errors that meshes cause
-  double tolerance = 0;       ///< see ElastostaticOptions
+  /// Gets these errors after each step. May be absent. What it throws is an error of the line.
+  std::function<void(const scene::Simulation&, const SceneEstimates&,
+                     std::span<const formats::EstimateAnswer>)>
+      estimated{};
+  double tolerance = 0; ///< see ElastostaticOptions
 };
 
 struct SceneCounts {
