@@ -226,18 +226,23 @@ define compile
 $(CCACHE) $(CXX) $(ALLFLAGS) $(FILE_FLAGS) $(precompiled) $(if $(filter $(BUILD)/unity/% $(UNIT_BUILD)/unity/%,$<),$(UNITY_FLAGS)) -MMD -MP -c $< -o $@
 endef
 
-# The viewer of pages, as strings of C++.
+# The viewer of pages and the Makefile of `gewebe --makefile`, as strings of C++.
 VIEWER := $(BUILD)/obj/viewer.o
 $(BUILD)/viewer.cpp: formats/page/viewer.html formats/page/viewer.js Makefile
 	@mkdir -p $(@D)
 	@{ for kind in html js; do printf 'extern "C" const char gewebe_viewer_%s[] = R"viewer(' $$kind && cat formats/page/viewer.$$kind && \
 	  printf ')viewer";\n' || exit 1; done; } > $@
-$(VIEWER): $(BUILD)/viewer.cpp | $(FIRST)
+STANDARD := $(BUILD)/obj/standard.o
+$(BUILD)/standard.cpp: tools/standard.mk Makefile
+	@mkdir -p $(@D)
+	@{ printf 'extern "C" const char gewebe_standard_makefile[] = R"makefile(' && cat tools/standard.mk && printf ')makefile";\n'; } > $@
+$(VIEWER) $(STANDARD): $(BUILD)/obj/%.o: $(BUILD)/%.cpp | $(FIRST)
 	@mkdir -p $(@D)
 	$(CXX) -fPIC -c $< -o $@
 
 $(ARCHIVE): $(call obj,$(LIB_SRC)) $(VIEWER)
 $(SHARED): $(call obj,$(SHARED_SRC))
+$(BUILD)/gewebe: $(STANDARD)
 $(ARCHIVE) $(SHARED):
 	@mkdir -p $(@D) && rm -f $@
 	$(AR) rcsD $@ $^

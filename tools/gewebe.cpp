@@ -19,6 +19,8 @@
 #include <unistd.h>
 #include <vector>
 
+extern "C" const char gewebe_standard_makefile[]; // tools/standard.mk
+
 using namespace gewebe;
 
 namespace {
@@ -29,10 +31,11 @@ constexpr std::string_view usage = R"(Starts the programs of Gewebe.
 Usage: gewebe PROGRAM [ARGUMENT...]
        gewebe plot --y NAME,... [OPTION...] [TABLE]
        gewebe help [PAGE]
-       gewebe --list | --help | --version
+       gewebe --list | --makefile | --help | --version
 
 Options:
   --list      the programs, and what they do
+  --makefile  a Makefile from a scan, mesh or particles to a solid, a run and a film
   -h,--help   this text
   --version   version, commit, libraries, kernels
 
@@ -112,9 +115,11 @@ void work(const std::vector<std::string>& words) {
     return write_text(std::string(usage) + cli::tool_list());
   if (word == "--list")
     return write_text(cli::tool_list());
+  if (word == "--makefile")
+    return write_text(gewebe_standard_makefile);
   if (word == "--version")
     return write_text(cli::version_text("gewebe"));
-  std::vector<std::string> known{"plot", "help", "--help", "--list", "--version"};
+  std::vector<std::string> known{"plot", "help", "--help", "--list", "--makefile", "--version"};
   std::ranges::copy(cli::tool_names(), std::back_inserter(known));
   throw UsageError("no program '" + word + "'" + text::suggestion(word, known) +
                    ", see gewebe --list");
