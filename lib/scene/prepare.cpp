@@ -7,8 +7,8 @@ namespace gewebe::scene {
 
 void Rule<Prepare>::check(World& w, const Prepare& c) {
   Object& object = w.now.objects.at(c.object);
-  require_support(w, object, Feature::prepare);
   need_model(object);
+  require_support(w, object, Feature::prepare);
   if (c.cut)
     require_support(w, object, Feature::cut);
   if (c.contact)

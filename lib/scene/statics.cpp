@@ -293,11 +293,11 @@ void Rule<SetWarp>::log(const World&, const SetWarp&, ChangeRow& row) {
 
 void Rule<SetTwoStep>::check(World& w, const SetTwoStep& c) {
   Object& object = w.now.objects.at(c.object);
+  need_model(object); // which may have a law of large strains
   if (!object.cut.first || !object.stages.model) // else that is cut too
     require_support(w, object, Feature::two_step);
   if (!c.model)
     return;
-  need_model(object);
   if (!statics::same_but_stiffness(object.cut.first ? *object.cut.first : object.model(), *c.model))
     throw Error("object " + object.name() +
                 " and the model of its second stage differ in more than stiffness, expected the "
