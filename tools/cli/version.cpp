@@ -30,11 +30,11 @@ extern "C" const char gewebe_commit[] __attribute__((weak)); // of programs, see
 namespace openvdb::OPENVDB_VERSION_NAME {
 void initialize() __attribute__((weak));
 }
-namespace gewebe::cli { // CGAL is headers alone: it is there with what uses them
+namespace gewebe::repair { // CGAL is headers alone: it is there with what uses them
 // NOLINTNEXTLINE(readability-redundant-declaration): it makes the reference weak
-repair::RepairReport repair_mesh(TriangleMesh& mesh, const repair::RepairOptions& options,
-                                 const Context& context) __attribute__((weak));
-} // namespace gewebe::cli
+RepairReport repair_mesh(TriangleMesh& mesh, const RepairOptions& options, const Context& context)
+    __attribute__((weak));
+} // namespace gewebe::repair
 
 namespace gewebe::cli {
 namespace {
