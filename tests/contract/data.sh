@@ -7,7 +7,7 @@ test_every_file_that_tests_name_is_told() {
   ! grep -q ': there' said.txt || fail 'there is something in an empty folder' "$(<said.txt)"
   while read -r name; do
     grep -q "^$name: absent$" said.txt || fail "a test reads $name, of which scripts/data says nothing"
-  done < <(grep -rhoE '\b(sofa|ts|hubmap|gca90|mcpro|eth)_[A-Za-z0-9_]+\.(obj|stl|dxf|png|nii\.gz|json)|malformed_(assimp|trimesh)|dxf_assimp|eth_beam' \
+  done < <(grep -rhoE '\b(sofa|ts|hubmap|gca90|mcpro|eth)_[A-Za-z0-9_]+\.(obj|stl|dxf|png|nii\.gz|json)|malformed_(assimp|trimesh)|dxf_assimp|eth_beam|pdms_cylinder' \
     "$GEWEBE_ROOT"/tests/unit "$GEWEBE_ROOT"/tests/contract "$GEWEBE_ROOT"/tests/golden/cases | sort -u)
 }
 
