@@ -293,7 +293,7 @@ void Rule<SetWarp>::log(const World&, const SetWarp&, ChangeRow& row) {
 
 void Rule<SetTwoStep>::check(World& w, const SetTwoStep& c) {
   Object& object = w.now.objects.at(c.object);
-  need_model(object); // which may have a law of large strains
+  need_model(object);                            // which may have a law of large strains
   if (!object.cut.first || !object.stages.model) // else that is cut too
     require_support(w, object, Feature::two_step);
   if (!c.model)
