@@ -13,9 +13,10 @@ namespace gewebe::cli {
 
 namespace {
 
-constexpr double contact_share = 1.2; // see the header
-constexpr double steepest = 0.5;      // cosine of the largest angle between both surfaces
-constexpr double near = 1;            // edges of a triangle: what is farther is a wound
+constexpr double contact_share = 1.2;        // see the header
+constexpr double steepest = 0.5;             // cosine of the largest angle between both surfaces
+constexpr double near = 1;                   // edges of a triangle: what is farther is a wound
+constexpr std::uint32_t inside = UINT32_MAX; // a node that is not on the surface
 
 std::vector<Box3> boxes_of(const TriangleMesh& mesh) {
   std::vector<Box3> boxes(mesh.triangles.size());
@@ -67,7 +68,8 @@ std::vector<double> ShapeError::energies(const ElementErrors& solid,
   const tetrahedra::TetMesh& mesh = *solid.mesh;
   std::vector<double> energy(mesh.tetrahedra.size());
   const tetrahedra::TetBoundary faces = boundary(mesh);
-  std::vector<std::uint32_t> owner(mesh.points.size()); // a tetrahedron of each surface node
+  // A tetrahedron of each surface node.
+  std::vector<std::uint32_t> owner(mesh.points.size(), inside);
   for (std::size_t k = 0; k < faces.mesh.triangles.size(); ++k) {
     const Triangle& triangle = faces.mesh.triangles[k];
     const std::uint32_t t = faces.tetrahedron[k];
@@ -97,7 +99,8 @@ std::vector<double> ShapeError::energies(const ElementErrors& solid,
         energy_density(solid.elements[t].material, fem::tensor_at(solid.stresses[t], middle));
   }
   for (const contact::NodeVector& f : touched) // forces point into the body
-    energy[owner[f.node]] -= contact_share * dot(f.value, way_from(mesh.points[f.node]));
+    if (owner[f.node] != inside) // else it is a displaced node, which no instrument touches
+      energy[owner[f.node]] -= contact_share * dot(f.value, way_from(mesh.points[f.node]));
   return energy;
 }
 
