@@ -40,6 +40,8 @@ CXX := $(if $(filter fuzz,$(config)),clang++-16,g++)
 endif
 
 WARNINGS := -Wall -Wextra -Wshadow -Wconversion $(if $(WERROR),-Werror)
+# g++ takes an std::optional without a value for one that is read uninitialised where a sanitizer instruments it.
+WARNINGS += $(if $(filter sanitize thread,$(config)),$(if $(findstring clang,$(CXX)),,-Wno-maybe-uninitialized))
 LANGUAGE := -std=c++20 -ffp-contract=off -fPIC
 # The libraries' headers stand in /usr/include, where no warning is shown; Eigen's have a folder of their own.
 INCLUDES := -Ilib -I. $(addprefix -isystem /usr/include/,eigen3 suitesparse hdf5/serial)
