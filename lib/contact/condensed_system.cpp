@@ -42,9 +42,16 @@ struct Part {
   std::vector<std::uint32_t> rows;          ///< their vertices in the body
   std::vector<std::uint32_t> active;        ///< active nodes, by ascending node
   std::vector<std::vector<Block3>> columns; ///< by active node: W(row, it)
-  std::vector<Index> unknowns;              ///< of the system
+  std::vector<std::uint32_t> unknowns;      ///< of the system
   MatrixXd inverse;                         ///< W_aa^-1 over them, in the world's frame
   VectorXd start;                           ///< W_aa^-1 R0_a
+};
+
+/// Of a pair's Hessian, over its unknowns.
+struct PairBlock {
+  std::uint32_t order = 0;
+  std::array<std::uint32_t, 12> unknown{};
+  std::size_t first = 0; ///< of order^2 values, row-major
 };
 
 /// Solution of Newton's system for one right-hand side.
@@ -73,7 +80,8 @@ struct InverseCache::State {
   };
   std::list<Inverse> inverses; ///< last used first
   // Memory of systems: that of a new one would be pages to be cleared.
-  std::vector<double> hessian, matrix;
+  std::vector<PairBlock> blocks;
+  std::vector<double> values;
   cholesky::BlockCholesky cholesky;
 };
 
@@ -125,13 +133,6 @@ struct CondensedSystem::State {
   State(const BodyTable& of, double with_ridge, InverseCache& with_cache, CpuLevel with_cpu)
       : table(of), ridge(with_ridge), cache(with_cache), cpu(with_cpu) {}
 
-  Eigen::Map<MatrixXd> hessian() {
-    return {cache.state_->hessian.data(), matrix_order, matrix_order};
-  }
-  Eigen::Map<MatrixXd> matrix() {
-    return {cache.state_->matrix.data(), matrix_order, matrix_order};
-  }
-
   std::size_t size() const { return static_cast<std::size_t>(matrix_order); }
 
   /// The Hessian has an entry of two nodes.
@@ -143,7 +144,8 @@ struct CondensedSystem::State {
     coupled.push_back({a.active, b.active});
   }
 
-  bool factor() {
+  /// Begins the system's matrix.
+  void begin_matrix() {
     // The nodes of a body fall into groups by the body that they touch: in a stack those of its top
     // are coupled with those of its bottom and of the next bottom alone.
     std::map<std::array<std::uint32_t, 2>, std::uint32_t> groups; // by body and partner
@@ -166,7 +168,27 @@ struct CondensedSystem::State {
     }
     for (const std::uint32_t node : node_of_unknown)
       group.push_back(group_of_node[node]);
-    return cache.state_->cholesky.factor(cache.state_->matrix, group, near, cpu);
+    cache.state_->cholesky.begin(group, near);
+  }
+
+  void add_pairs() {
+    for (const PairBlock& b : cache.state_->blocks)
+      for (std::size_t i = 0; i < b.order; ++i)
+        for (std::size_t j = 0; j < b.order; ++j)
+          if (b.unknown[i] >= b.unknown[j])
+            cache.state_->cholesky.entry(b.unknown[i], b.unknown[j]) +=
+                cache.state_->values[b.first + i * b.order + j];
+  }
+
+  /// p^T H p.
+  double curvature(const VectorXd& of) const {
+    double sum = 0;
+    for (const PairBlock& b : cache.state_->blocks)
+      for (std::size_t i = 0; i < b.order; ++i)
+        for (std::size_t j = 0; j < b.order; ++j)
+          sum +=
+              of[b.unknown[i]] * cache.state_->values[b.first + i * b.order + j] * of[b.unknown[j]];
+    return sum;
   }
 
   Index matrix_order = 0;
@@ -219,11 +241,8 @@ struct CondensedSystem::State {
     return all;
   }
 
-  /// Solves for a direction, whose p is the right-hand side up to now, and finds its part of
-  /// q = -(F + c W^-1 R0 + W^-1 p).
+  /// Finds a direction's part of q = -(F + c W^-1 R0 + W^-1 p).
   void finish(Direction& d, bool forces, bool moves) {
-    if (matrix_order > 0)
-      cache.state_->cholesky.solve({d.p.data(), size()});
     d.change.assign(active.size(), {});
     d.response.resize(nodes.size());
     for (const Part& part : parts) {
@@ -277,7 +296,8 @@ struct CondensedSystem::State {
     for (Index j = 0; j < order; ++j) {
       const auto [kj, aj] = axes[static_cast<std::size_t>(j)];
       const ActiveNode& node = active[part.active[static_cast<std::size_t>(kj)]];
-      part.unknowns.push_back(node.unknown[static_cast<std::size_t>(aj)]);
+      part.unknowns.push_back(
+          static_cast<std::uint32_t>(node.unknown[static_cast<std::size_t>(aj)]));
       r0[j] = start_of(node.node)[aj];
     }
     part.inverse = turned(part, axes, inverse_of(part, axes, largest));
@@ -456,7 +476,8 @@ void CondensedSystem::activate(std::span<const std::uint32_t> vertices) {
 
 void CondensedSystem::clear_hessian() {
   State& s = *state_;
-  s.cache.state_->hessian.assign(s.size() * s.size(), 0);
+  s.cache.state_->blocks.clear();
+  s.cache.state_->values.clear();
   s.carried.setZero(s.matrix_order);
   s.coupled.clear();
   for (ActiveNode& node : s.active)
@@ -480,46 +501,56 @@ void CondensedSystem::add_hessian(std::span<const std::uint32_t> of,
       way[3 * k + a] = unknown[3 * k + a] < 0 ? carried[static_cast<int>(a)] : 0;
     }
   }
-  Eigen::Map<MatrixXd> hessian = s.hessian();
+  PairBlock pair;
+  pair.first = s.cache.state_->values.size();
   for (std::size_t i = 0; i < order; ++i) {
     if (unknown[i] < 0)
       continue;
+    pair.unknown[pair.order++] = static_cast<std::uint32_t>(unknown[i]);
     double carried = 0;
     for (std::size_t j = 0; j < order; ++j) {
       const double h = block[order * i + j];
       if (unknown[j] < 0)
         carried += h * way[j];
       else
-        hessian(unknown[i], unknown[j]) += h;
+        s.cache.state_->values.push_back(h);
     }
     s.carried[unknown[i]] += carried;
   }
+  s.cache.state_->blocks.push_back(pair);
 }
 
 bool CondensedSystem::solve(std::span<const Vec3> gradient, double damping) {
   State& s = *state_;
   const Index order = s.matrix_order;
-  s.cache.state_->matrix = s.cache.state_->hessian;
-  Eigen::Map<MatrixXd> matrix = s.matrix();
-  matrix.diagonal().array() += damping;
+  cholesky::BlockCholesky& matrix = s.cache.state_->cholesky;
+  s.begin_matrix();
+  s.add_pairs();
+  for (std::uint32_t u = 0; u < s.size(); ++u)
+    matrix.entry(u, u) += damping;
   auto& [still, whole] = s.way.direction;
   whole.p = -s.carried;
   for (const Part& part : s.parts) {
     const auto count = static_cast<Index>(part.unknowns.size());
     for (Index j = 0; j < count; ++j) {
-      const Index column = part.unknowns[static_cast<std::size_t>(j)];
+      const std::uint32_t column = part.unknowns[static_cast<std::size_t>(j)];
       whole.p[column] -= s.way.c * part.start[j];
-      for (Index i = 0; i < count; ++i)
-        matrix(part.unknowns[static_cast<std::size_t>(i)], column) += part.inverse(i, j);
     }
+    matrix.add_block(part.unknowns,
+                     {part.inverse.data(), static_cast<std::size_t>(part.inverse.size())});
   }
   still.p = -s.condensed(gradient);
   for (const ActiveNode& active : s.active)
     for (int a = 0; a < 3; ++a)
       if (const std::int32_t u = active.unknown[static_cast<std::size_t>(a)]; u >= 0)
         still.p[u] -= s.now.force[s.nodes[active.node].active][a];
-  if (order > 0 && !s.factor())
+  if (order > 0 && !matrix.factor(s.cpu))
     return false;
+  VectorXd both(2 * order);
+  both << still.p, whole.p;
+  matrix.solve({both.data(), 2 * s.size()});
+  still.p = both.head(order);
+  whole.p = both.tail(order);
   s.finish(still, true, false);
   s.finish(whole, false, true);
   choose_reach(1);
@@ -581,7 +612,7 @@ double CondensedSystem::slope() const {
 void CondensedSystem::require_descent(double contact_slope) {
   State& s = *state_;
   // Newton's decrement that the step would have without the way.
-  const double descent = s.p.dot(s.hessian() * s.p) + s.terms.qq, total = slope() + contact_slope;
+  const double descent = s.curvature(s.p) + s.terms.qq, total = slope() + contact_slope;
   if (s.way.c > 0 && s.way.reach > 0 && !(total <= -0.5 * descent))
     s.way.energy += (total + descent) / (s.way.c * s.way.c);
 }

@@ -51,14 +51,28 @@ Blocks blocks(const std::vector<std::size_t>& sizes, const std::vector<std::uint
   return all;
 }
 
+/// \return whether the factor finds it positive definite
+bool factored(const Blocks& of, CpuLevel cpu, cholesky::BlockCholesky& factor) {
+  factor.begin(of.group, of.coupled);
+  const std::size_t groups = static_cast<std::size_t>(std::sqrt(of.coupled.size()) + 0.5);
+  for (std::uint32_t i = 0; i < of.group.size(); ++i)
+    for (std::uint32_t j = 0; j <= i; ++j)
+      if (of.group[i] == of.group[j] || of.coupled[of.group[i] * groups + of.group[j]] != 0)
+        (i % 2 == 0 ? factor.entry(i, j) : factor.entry(j, i)) += of.matrix(i, j);
+  return factor.factor(cpu);
+}
+
 VectorXd solved(const Blocks& of, const VectorXd& f, CpuLevel cpu,
                 cholesky::BlockCholesky& factor) {
-  MatrixXd copy = of.matrix;
-  EXPECT_TRUE(factor.factor({copy.data(), static_cast<std::size_t>(copy.size())}, of.group,
-                            of.coupled, cpu));
-  VectorXd x = f;
+  EXPECT_TRUE(factored(of, cpu, factor));
+  MatrixXd x(f.size(), 2); // two at a time are what each is alone
+  x << -2 * f, f;
   factor.solve({x.data(), static_cast<std::size_t>(x.size())});
-  return x;
+  VectorXd alone = f;
+  factor.solve({alone.data(), static_cast<std::size_t>(alone.size())});
+  EXPECT_EQ(alone, x.col(1));
+  EXPECT_EQ(-2 * alone, x.col(0));
+  return alone;
 }
 
 TEST(BlockCholesky, SolvesAnyGraphOfGroupsAsADenseFactorDoes) {
@@ -85,18 +99,46 @@ TEST(BlockCholesky, SolvesAnyGraphOfGroupsAsADenseFactorDoes) {
   }
 }
 
+TEST(BlockCholesky, AddsABlockInAnyOrder) {
+  const std::vector<std::uint8_t> coupled{0, 1, 0, 1, 0, 1, 0, 1, 0};
+  Blocks all = blocks({7, 5, 3}, coupled, 2);
+  std::vector<std::uint32_t> unknowns; // of two groups
+  for (std::uint32_t u = 0; u < all.group.size(); ++u)
+    if (all.group[u] != 0)
+      unknowns.push_back(u);
+  std::ranges::reverse(unknowns);
+  const auto order = static_cast<Index>(unknowns.size());
+  const MatrixXd half = MatrixXd::Random(order, order);
+  const MatrixXd block = half * half.transpose();
+  cholesky::BlockCholesky factor;
+  EXPECT_TRUE(factored(all, best_cpu_level(), factor));
+  factor.begin(all.group, all.coupled);
+  for (std::uint32_t i = 0; i < all.group.size(); ++i)
+    for (std::uint32_t j = 0; j <= i; ++j)
+      if (all.matrix(i, j) != 0)
+        factor.entry(j, i) += all.matrix(i, j);
+  factor.add_block(unknowns, {block.data(), static_cast<std::size_t>(block.size())});
+  EXPECT_TRUE(factor.factor(best_cpu_level()));
+  for (Index i = 0; i < order; ++i)
+    for (Index j = 0; j < order; ++j)
+      all.matrix(unknowns[static_cast<std::size_t>(i)], unknowns[static_cast<std::size_t>(j)]) +=
+          block(i, j);
+  const VectorXd f = VectorXd::Random(all.matrix.rows());
+  VectorXd x = f;
+  factor.solve({x.data(), static_cast<std::size_t>(x.size())});
+  EXPECT_LE((all.matrix * x - f).norm(), 1e-12 * f.norm());
+}
+
 TEST(BlockCholesky, RefusesWhatIsNotPositiveDefinite) {
   const std::vector<std::uint8_t> chain{0, 1, 0, 1, 0, 1, 0, 1, 0};
-  Blocks all = blocks({4, 5, 6}, chain, 1);
+  const Blocks all = blocks({4, 5, 6}, chain, 1);
   for (Index at = 0; at < all.matrix.rows(); ++at) {
-    MatrixXd wrong = all.matrix;
-    wrong(at, at) = -wrong(at, at);
+    Blocks wrong = all;
+    wrong.matrix(at, at) = -wrong.matrix(at, at);
     cholesky::BlockCholesky factor;
-    EXPECT_FALSE(factor.factor({wrong.data(), static_cast<std::size_t>(wrong.size())}, all.group,
-                               all.coupled, best_cpu_level()));
-    wrong(at, at) = NAN;
-    EXPECT_FALSE(factor.factor({wrong.data(), static_cast<std::size_t>(wrong.size())}, all.group,
-                               all.coupled, best_cpu_level()));
+    EXPECT_FALSE(factored(wrong, best_cpu_level(), factor));
+    wrong.matrix(at, at) = NAN;
+    EXPECT_FALSE(factored(wrong, best_cpu_level(), factor));
   }
 }
 
