@@ -16,3 +16,21 @@ test_scores_refuse_other_tables() {
   printf 'x,y,z\n0,0,0\n' | expect_failure 1 score.awk awk -f "$score"
   printf 'x0,y0,z0,x,y,z\n0,0,0,0,0,0\n' | expect_failure 1 score.awk awk -f "$score"
 }
+
+test_silicone_beam() {
+  [[ $(basename "$BUILD") == release ]] || skip 'for config=release'
+  unset MAKEFLAGS MAKELEVEL
+  cp "$GEWEBE_ROOT"/examples/experiments/silicone-beam/{Makefile,*.awk} .
+  make -s >said 2>err || fail "$(<err)"
+  awk '/^mean/ { mean[++n] = $2 + 0 }
+    END { exit !(n == 2 && mean[1] > -0.5 && mean[1] < 0.5 && mean[2] > -6 && mean[2] < -3) }' said || fail "$(<said)"
+}
+
+test_scores_of_markers_turn_with_the_end() {
+  local score=$GEWEBE_ROOT/examples/experiments/silicone-beam/score.awk n
+  n=$(printf 'x0,y0,z0,x,y,z\n100,15,0,100,15,0\n100,15,30,130,15,0\n100,0,24,100,0,23\n100,30,6,100,30,5\n' |
+    awk -v measured='36 1 1' -f "$score" | grep -c '+0.0 %') || true
+  [[ $n == 4 ]] || fail "an end that is turned by 90 degrees: $n lines"
+  printf 'x,y,z\n0,0,0\n' | expect_failure 1 score.awk awk -v measured='1 1 1' -f "$score"
+  printf 'x0,y0,z0,x,y,z\n0,0,0,0,0,0\n' | expect_failure 1 score.awk awk -v measured='1 1 1' -f "$score"
+}
