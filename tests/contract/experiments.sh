@@ -34,3 +34,19 @@ test_scores_of_markers_turn_with_the_end() {
   printf 'x,y,z\n0,0,0\n' | expect_failure 1 score.awk awk -v measured='1 1 1' -f "$score"
   printf 'x0,y0,z0,x,y,z\n0,0,0,0,0,0\n' | expect_failure 1 score.awk awk -v measured='1 1 1' -f "$score"
 }
+
+test_uterus() {
+  [[ $(basename "$BUILD") == release ]] || skip 'for config=release'
+  unset MAKEFLAGS MAKELEVEL
+  cp "$GEWEBE_ROOT"/examples/experiments/uterus/{Makefile,*.awk} .
+  make -s CELLS='6 5 4' PULLED='4 3 2' >said 2>err || fail "$(<err)"
+  awk '{ off = $NF == "%" ? $(NF - 1) + 0 : 1e9; low = /^tension/ ? 0 : 15; high = /^tension/ ? 20 : 35; good += off > low && off < high }
+    END { exit !(NR == 4 && good == 4) }' said || fail "$(<said)"
+}
+
+test_scores_of_forces_need_all() {
+  local score=$GEWEBE_ROOT/examples/experiments/uterus/score.awk
+  printf '%s\n' test,displacement,force tension,2.12,16.94 tension,4.24,40.41 tension,6.36,108.25 indentation,1.26,24.62 >forces
+  awk -f "$score" forces | grep -qx 'indentation 1.26 mm: 24.62 mN, measured 12.31 mN, +100.0 %' || fail 'another score'
+  head -3 forces | expect_failure 1 score.awk awk -f "$score"
+}
