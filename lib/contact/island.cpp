@@ -262,9 +262,8 @@ bool IslandMotion::watch_energy(const Solved& first, std::span<const Vec3> start
         all.gain += dot(force, way(f.vertex));
     }
   };
-  take(first.forces, [&](std::uint32_t v) {
-    return numeric::stage_extension * (first.to[v] - first.from[v]);
-  });
+  take(first.forces,
+       [&](std::uint32_t v) { return numeric::stage_extension * (first.to[v] - first.from[v]); });
   take(solver_->forces(), [&](std::uint32_t v) { return to[v] - start[v]; });
   if (all.gain <= rounding * all.scale)
     return true;

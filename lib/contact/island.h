@@ -85,8 +85,7 @@ public:
     Vec3 force;
   };
   /// Ends the step with these forces on the member's vertices, by ascending vertex.
-  virtual void end(std::span<const Force> forces, const Interval& step,
-                   const Context& context) = 0;
+  virtual void end(std::span<const Force> forces, const Interval& step, const Context& context) = 0;
 };
 
 /// Into how many parts the last steps of bodies had to be halved, so that the next one need not

@@ -75,7 +75,8 @@ public:
       : island_(island), inverses_(inverses), options_(options), context_(context),
         count_(island.table.vertex_count()), begin_(read_positions(island.table)), at_(begin_),
         way_(count_), trial_(count_), gradient_(count_), d_hat_(island.activation_distance),
-        candidates_(island, broad_phase, options.parameters), energy_(island, options,
+        candidates_(island, broad_phase, options.parameters),
+        energy_(island, options,
                 options.start.empty() ? std::span<const Vec3>(begin_) : options.start) {}
 
   StepReport run();

@@ -341,8 +341,7 @@ double SolidDynamic::keep_length(double h) {
 std::vector<double> SolidDynamic::begin_step(const contact::Interval& step) {
   integrator::SolidMotion& moving = *engine_;
   const auto [from, to, stage] = step;
-  const std::vector<double> forces =
-      forces_at(to, stage == numeric::Stage::whole ? 0 : to - from);
+  const std::vector<double> forces = forces_at(to, stage == numeric::Stage::whole ? 0 : to - from);
   for (std::size_t axis = 0; axis < forces.size(); ++axis)
     if (!(std::abs(forces[axis]) <= largest_force))
       throw MotionError(static_cast<std::uint32_t>(axis / 3), to,
@@ -517,9 +516,8 @@ void SolidDynamic::end_contact_step(std::span<const contact::VertexForce> forces
   }
   counts_.limited += body_ && body_->inner_factor() < 1 ? 1 : 0;
   if (step_.stage != numeric::Stage::first) {
-    const double whole = step_.stage == numeric::Stage::second
-                             ? length / (1 - numeric::stage_length)
-                             : length;
+    const double whole =
+        step_.stage == numeric::Stage::second ? length / (1 - numeric::stage_length) : length;
     settle(begun_, step_.to, forces.empty() ? 0 : rest_in_contact * whole, context);
   }
   take_over();

@@ -50,8 +50,7 @@ void MotionStages::begin(Stage stage, const MotionState& state, std::span<const 
 }
 
 void MotionStages::end(const MotionBody& body, double h, const MotionState& state,
-                       const Numbers& at, const SolidEnergy& energy, double before,
-                       double after) {
+                       const Numbers& at, const SolidEnergy& energy, double before, double after) {
   const Stage ended = stage_;
   stage_ = Stage::whole;
   reached_ = {};
@@ -65,8 +64,8 @@ void MotionStages::end(const MotionBody& body, double h, const MotionState& stat
                  .velocity = state.velocity,
                  .kept = energy.kept(),
                  .h = h,
-                 .allowed = motion_energy(body, state.velocity) + before - after +
-                            stage_extension * work};
+                 .allowed =
+                     motion_energy(body, state.velocity) + before - after + stage_extension * work};
 }
 
 void MotionStages::abandon(SolidEnergy& energy) {

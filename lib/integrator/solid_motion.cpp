@@ -522,8 +522,8 @@ SolidStep SolidMotion::step(double h, const Context& context, numeric::Stage sta
   if (!s.now.any_held())
     objective.keep_both_momenta(found);
   if (second)
-    s.allowed = s.stages.allowed(s.now, found.at, before) -
-                work_of_load(s.body, s.now.load, found.at);
+    s.allowed =
+        s.stages.allowed(s.now, found.at, before) - work_of_load(s.body, s.now.load, found.at);
   else
     for (std::size_t axis = 0; axis < s.body.axes(); ++axis)
       s.allowed += s.reactions[axis] * (found.at[axis] - s.now.place[axis]);
@@ -589,17 +589,14 @@ void SolidMotion::begin_step(double h, const Context& context, double elapsed,
     return;
   }
   s.begin_stage(stage);
-  s.recall(second               ? numeric::stage_extension * h
-           : std::isfinite(h) ? h
-                                : elapsed,
-           context);
+  s.recall(second ? numeric::stage_extension * h : std::isfinite(h) ? h : elapsed, context);
   const int made = s.quick.prepare(s.body, s.energy.springs(), s.now.held, h, s.options, context);
-  s.open.emplace(State::Open{.objective = MotionObjective(s.body, s.now, s.stages.start(s.now),
-                                                          s.energy, h, s.options),
-                             .point = {},
-                             .found = {},
-                             .base = {},
-                             .step = {}});
+  s.open.emplace(State::Open{
+      .objective = MotionObjective(s.body, s.now, s.stages.start(s.now), s.energy, h, s.options),
+      .point = {},
+      .found = {},
+      .base = {},
+      .step = {}});
   State::Open& open = *s.open;
   open.found.at = s.now.place;
   open.counts.factorisations = made;
@@ -825,8 +822,7 @@ StageEnergy SolidMotion::stage_energy(const Context& context) {
   ends.place = open.found.at;
   const MotionStart& start = open.objective.start();
   for (std::size_t axis = 0; axis < s.body.axes(); ++axis)
-    ends.velocity[axis] =
-        (open.found.at[axis] - start.place[axis]) / open.objective.step();
+    ends.velocity[axis] = (open.found.at[axis] - start.place[axis]) / open.objective.step();
   const double kinetic = motion_energy(s.body, ends.velocity), elastic = s.energy.elastic(),
                allowed = s.stages.allowed(s.now, open.found.at, s.elastic);
   StageEnergy energy;

@@ -54,8 +54,7 @@ contact::ContactBody& BodyMember::begin(const contact::Interval& step, const Con
 
 /// Forces on the nodes of a part, by its own numbers.
 std::vector<contact::NodalContactForce>
-BodyMember::forces_on(const Object& part,
-                      std::span<const contact::NodalContactForce> all) const {
+BodyMember::forces_on(const Object& part, std::span<const contact::NodalContactForce> all) const {
   std::vector<contact::NodalContactForce> own;
   for (contact::NodalContactForce f : all) {
     if (f.node < part.offset || f.node - part.offset >= part.model().nodes.size())
