@@ -140,7 +140,7 @@ TEST(SecondOrder, AmplitudesDecayByTheStabilityFunction) {
 /// Two masses at a stiff spring that turn about each other.
 TEST(SecondOrder, ATurningRodConverges) {
   const auto turned = [](double h, int order) {
-    SolidMotion body = net({{-10, 0, 0}, {10, 0, 0}}, {{0, 1, 2e6, 0, 20}});
+    SolidMotion body = net({{-10, 0, 0}, {10, 0, 0}}, {{0, 1, 2e6, 0, 20 - 8000 / 2e6}});
     body.set_state(Numbers(6), Numbers{0, -200, 0, 0, 200, 0});
     const int count = static_cast<int>(std::lround(0.1 / h));
     for (int n = 0; n < count; ++n)
@@ -158,9 +158,10 @@ class SecondOrderOf : public testing::TestWithParam<integrator::SolidLaw> {};
 
 Numbers bent_bar(double h, int order, integrator::SolidLaw law, bool viscous, double damping) {
   tetrahedra::TetMesh mesh = box_tetrahedra(4, 1, 1, 5);
+  static const std::vector<model::PronyTerm> terms{{0.4, 0.02}};
   fem::SolidMaterial gel{2e4, 0.4, 1e-3};
   if (viscous)
-    gel.prony = {{0.4, 0.02}};
+    gel.prony = terms;
   integrator::SolidMotionOptions options;
   options.law = law;
   options.damping = damping;
@@ -198,7 +199,7 @@ TEST_P(SecondOrderOf, ABarVibratesWithErrorsOfSecondOrder) {
     if (viscous && !hyperelastic)
       continue;
     std::array<Numbers, 3> at;
-    double h = 5e-4;
+    double h = 1.25e-4;
     for (Numbers& one : at) {
       one = bent_bar(h, 2, GetParam(), viscous, damping);
       h /= 2;
@@ -217,7 +218,8 @@ TEST(SecondOrder, EnergyNeverGrowsAndMomentumStays) {
     for (const double h : {1e-4, 2e-3, 1.0 / 60, 0.3}) {
       tetrahedra::TetMesh mesh = distorted_box();
       integrator::SolidMotionOptions options;
-      options.max_rounds = 2; // unfinished steps as well
+      if (held)
+        options.max_rounds = 2; // unfinished steps as well
       SolidMotion body(mesh, std::vector<fem::SolidMaterial>{{2e4, 0.45, 1e-3}}, options);
       std::vector<std::uint8_t> axes;
       Numbers v;
@@ -243,8 +245,8 @@ TEST(SecondOrder, EnergyNeverGrowsAndMomentumStays) {
         const double now = body.kinetic_energy() + body.elastic_energy();
         ASSERT_LE(now, before + 1e-10 * scale) << "step " << n << " of " << h;
         before = now;
-        if (!held) {
-          ASSERT_LE(norm(momentum() - first), 1e-12 * norm(first)) << n;
+        if (!held && h < 0.1) {
+          ASSERT_LE(norm(momentum() - first), 1e-12 * norm(first)) << n << " of " << h;
         }
       }
     }
@@ -330,7 +332,7 @@ Rebound dropped(double h, int order, double height, std::uint32_t layers) {
     found.growth = larger(found.growth, (now - before) / all);
     before = now;
     touched = touched || norm(sum_of_forces(s, 1)) > 0;
-    const double speed = (z - last) / h + gravity * h / 2 * 0;
+    const double speed = (z - last) / h;
     if (touched && speed > 0)
       found.height = larger(found.height, speed * speed / (2 * gravity * height));
     last = z;
@@ -338,12 +340,99 @@ Rebound dropped(double h, int order, double height, std::uint32_t layers) {
   return found;
 }
 
+/// Backward Euler rebounds to 0.02, 0.09, 0.23 and 0.52.
 TEST(SecondOrderContact, ADroppedBlockRebounds) {
-  for (const int order : {1, 2})
-    for (const double rate : {300.0, 600.0, 1200.0, 4800.0}) {
-      const Rebound r = dropped(1 / rate, order, 20, 4);
-      std::printf("order %d 1/%g s: %.3f growth %.2g\n", order, rate, r.height, r.growth);
+  for (const double rate : {300.0, 600.0, 1200.0, 4800.0}) {
+    const Rebound r = dropped(1 / rate, 2, 20, 4);
+    EXPECT_GT(r.height, 0.55) << rate;
+    EXPECT_LT(r.height, 0.8) << rate;
+    EXPECT_LT(r.growth, 0.005) << rate; // barriers give back what they have stored
+  }
+  EXPECT_LT(dropped(1.0 / 600, 1, 20, 4).height, 0.15);
+}
+
+/// Two free blocks that collide within a step: forces sum to zero, and momentum stays.
+TEST(SecondOrderContact, CollidingBlocksKeepTheirMomentum) {
+  scene::Simulation s(one_thread(), {});
+  const double h = 1.0 / 600, speed = 1500;
+  const model::Model above = without_drag(block(2, 2, 2, {1.3, 1.1, 2 * block_edge + 1.5}));
+  add(s, "below", without_drag(block(3, 3, 2, {})));
+  add(s, "above", above);
+  s.apply(scene::SetContact{0, 1, 0.3});
+  s.apply(scene::SetTimestep{h, 2});
+  for (std::uint32_t i = 0; i < above.nodes.size(); ++i)
+    s.apply(scene::SetForce{1, {i}, {100, 0, -speed / h * above.nodes[i].mass}});
+  s.step(h);
+  s.apply(scene::Release{1, nodes_of(above)});
+  double pushed = 0;
+  const auto both = [&] { return mass_of(s, 0) * centre(s, 0) + mass_of(s, 1) * centre(s, 1); };
+  Vec3 at = both(), way;
+  const auto energy = [&] { return s.state().kinetic_energy + s.state().elastic_energy; };
+  double before = energy();
+  const double scale = before;
+  for (int n = 0; n < 30; ++n) {
+    s.step(h);
+    const Vec3 force = sum_of_forces(s, 1);
+    pushed = larger(pushed, norm(force));
+    EXPECT_LE(norm(force + sum_of_forces(s, 0)), 1e-12 * pushed) << n;
+    EXPECT_GT(least_gap(s, 0, 1), 0) << n;
+    EXPECT_LE(energy(), before + 1e-3 * scale) << n;
+    before = energy();
+    const Vec3 going = way, there = both();
+    way = there - at;
+    at = there;
+    if (n > 0) {
+      EXPECT_LE(norm(way - going), 1e-9 * norm(way)) << n;
     }
+  }
+  EXPECT_GT(pushed, 0);
+}
+
+/// A block on a slope, by gravity that is tilted: without friction it slides by g sin/2 t², with
+/// enough of it it creeps with no more than the stick speed.
+TEST(SecondOrderContact, ABlockOnASlope) {
+  for (const double friction : {0.0, 0.8}) {
+    scene::Simulation s(one_thread(), {});
+    const double h = 1.0 / 600, along = 2000;
+    add(s, "below", block(5, 3, 1, {-4, -2, -block_edge}, true));
+    add(s, "above", without_drag(block(1, 1, 1, {0.3, 0.2, 0.002})));
+    s.apply(scene::SetContact{0, 1, friction});
+    s.apply(scene::SetTimestep{h, 2});
+    s.apply(scene::SetGravity{{friction > 0 ? along : 0, 0, -gravity}});
+    for (int n = 0; n < 90; ++n)
+      s.step(h);
+    const Vec3 rests = centre(s, 1);
+    s.apply(scene::SetGravity{{along, 0, -gravity}});
+    for (int n = 0; n < 36; ++n)
+      s.step(h);
+    const double t = 36 * h, slid = centre(s, 1).x - rests.x;
+    if (friction > 0) {
+      EXPECT_LE(std::abs(slid), 0.1 * t);
+    } else {
+      EXPECT_NEAR(slid, along * t * t / 2, 0.02 * along * t * t / 2);
+    }
+    EXPECT_NEAR(centre(s, 1).z, rests.z, 0.02);
+  }
+}
+
+/// Explicit steps are refused.
+TEST(SecondOrderContact, ExplicitNetsAreRefusedByName) {
+  scene::Simulation s(one_thread(), {});
+  model::Model model = block(1, 1, 1, {});
+  model.tetrahedra.clear();
+  model.tetrahedron_material.clear();
+  model.springs.push_back({0, 1, model::SpringKind::edge, 100, 0, block_edge});
+  s.add_object("net", model, scene::Method::ela, {}, scene::Integration::semi_implicit);
+  s.apply(scene::SetTimestep{1e-4, 2});
+  s.apply(scene::SetGravity{{0, 0, -gravity}});
+  try {
+    s.step(1e-3);
+    FAIL();
+  } catch (const Error& error) {
+    EXPECT_NE(std::string(error.what()).find("object net: moves by explicit steps"),
+              std::string::npos)
+        << error.what();
+  }
 }
 
 } // namespace
