@@ -12,6 +12,13 @@
 // damped. The minimum is sought downhill in this function alone, so that a body that was turned
 // inside out finds back, whatever the tolerance is.
 //
+// Steps of second order are two such steps of gamma h (numeric/two_stages.h): the second one counts
+// inertia, damping and friction from places, speeds and strains extrapolated from the first one,
+// and starts where the first one ended, which does not intersect. Energy may grow in an impact that
+// is not resolved, by up to about a tenth. Then speeds that neither move nor turn a body as a whole
+// are lowered, so that momentum stays; where that does not suffice in an island, the first stage
+// stays and the rest of the step is one of backward Euler (contact/island.cpp).
+//
 // The quick way is a quasi-Newton method with a constant matrix (Liu, Bouaziz, Kavan, Quasi-Newton
 // methods for real-time simulation of hyperelastic materials, ACM TOG 36(3), 2017). The matrix is A
 // = M (1/h² + drag/h) + (1 + damping/h) K at rest, factored once for each length of step and set of
@@ -189,8 +196,9 @@ public:
   /// in h.
   /// \pre h > 0 \throw Error if the state is no longer finite, or as Factor; Cancelled
   /// \param stage  of a step of second order: the first one is a step of h, whose load and targets
-  /// are those of its end. The second one, of the same h, makes of it a step of (1 + sqrt 2) h more
-  /// than that, and energy is watched over both. \pre a second one: has_first_stage(h)
+  /// are those of its end. The second one, of the same h, goes on by (1 + sqrt 2) h and makes of
+  /// both a step of second order, over which energy is watched. \pre a second one:
+  /// has_first_stage(h)
   SolidStep step(double h, const Context& context, numeric::Stage stage = numeric::Stage::whole);
   /// Whether the last step was a first stage of h that a second one may follow: not where it went
   /// by recovery.
