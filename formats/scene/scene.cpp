@@ -283,9 +283,15 @@ What parse_gravity(Words& in) {
 }
 
 What parse_timestep(Words& in) {
-  const scene::SetTimestep c{in.number("time")};
+  scene::SetTimestep c{in.number("time")};
   if (!(c.dt > 0))
     in.fail("a timestep that is not positive");
+  if (in.done())
+    return ChangeCommand{.change = c};
+  if (const std::string& word = in.word("order=1 or order=2"); word == "order=2")
+    c.order = 2;
+  else if (word != "order=1")
+    in.fail(shown(word) + " is no order");
   return ChangeCommand{.change = c};
 }
 
@@ -444,7 +450,7 @@ const std::array<Verb, 30>& verbs() {
       {"restore", "restore NAME", true, parse_restore},
       {"gravity", "gravity gx gy gz", true, parse_gravity},
       {"method", "method NAME ffe|ela", true, parse_method},
-      {"timestep", "timestep dt", true, parse_timestep},
+      {"timestep", "timestep dt [order=1|order=2]", true, parse_timestep},
       {"two-step", "two-step NAME f0 [series] [stage=FILE.ela], f0 positive", true, parse_two_step},
       {"emit",
        "emit shapes|surfaces|forces|instruments, emit stress NAME [NODES], or emit model NAME FILE",

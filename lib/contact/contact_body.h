@@ -14,6 +14,7 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -26,6 +27,13 @@ using Block3 = std::array<double, 9>;
 struct VertexForce {
   std::uint32_t vertex = 0; ///< of the body
   Vec3 force;
+};
+
+/// What a body's energy has come to in a step of two stages, 1e-9 J.
+struct EnergyGain {
+  double gain = 0;  ///< beyond the work of its own loads
+  double inner = 0; ///< of speeds that neither move nor turn it as a whole, and can be lowered
+  double scale = 0; ///< of its energies, for rounding
 };
 
 /// Owned by the maker of a step; lives for that step.
@@ -82,6 +90,12 @@ public:
   virtual bool solve_alone() { return false; }
   /// Moves back to where the step began. \pre it can solve_alone()
   virtual void begin_again() {}
+
+  /// Energy of a body with inertia where the second stage has moved it to; nothing of a body that
+  /// goes where it must, or is at rest. \pre a second stage
+  virtual std::optional<EnergyGain> energy_gain() { return std::nullopt; }
+  /// Multiplies the speeds of `inner` at the end of the stage.
+  virtual void slow_down(double /*factor*/) {}
 
   /// Whether one model serves for the whole step.
   virtual bool is_linear() const = 0;

@@ -26,6 +26,17 @@ constexpr double radius_offset = 0.6;
 
 constexpr double typical_strain = 1e-2;
 
+/// Part of the energies by which rounding may let them grow.
+constexpr double rounding = 1e-12;
+
+std::vector<Vec3> positions_of(const BodyTable& table) {
+  std::vector<Vec3> x(table.vertex_count());
+  for (std::size_t b = 0; b < table.bodies.size(); ++b)
+    table.bodies[b]->positions(
+        std::span(x).subspan(table.first[b], table.first[b + 1] - table.first[b]));
+  return x;
+}
+
 double median_edge(const collision::CollisionSurface& surface) {
   std::vector<double> lengths;
   for (const auto& [a, b] : surface.edges)
@@ -178,17 +189,19 @@ StepReport IslandMotion::take_report() {
   return std::exchange(report_, {});
 }
 
-void IslandMotion::step(Members members, double from, double to, const Context& context) {
+/// Begins a step of all members. \return positions of all vertices
+std::vector<Vec3> IslandMotion::begin(Members members, const Interval& step,
+                                      const Context& context) {
   BodyTable& table = island_->table;
   table.bodies.clear();
   for (IslandMember* const member : members)
-    table.bodies.push_back(&member->begin(from, to, context));
-  std::vector<Vec3> x(table.vertex_count());
-  for (std::size_t b = 0; b < table.bodies.size(); ++b)
-    table.bodies[b]->positions(
-        std::span(x).subspan(table.first[b], table.first[b + 1] - table.first[b]));
-  radii_->fit(x);
-  report_.add(solver_->solve({to - from, parameters_}, context));
+    table.bodies.push_back(&member->begin(step, context));
+  return positions_of(table);
+}
+
+/// Ends the step that has been solved.
+void IslandMotion::end(Members members, const Interval& step, const Context& context) {
+  const BodyTable& table = island_->table;
   std::vector<std::vector<IslandMember::Force>> forces(members.size());
   std::size_t body = 0;
   for (const ContactForce& f : solver_->forces()) { // by ascending vertex
@@ -197,34 +210,145 @@ void IslandMotion::step(Members members, double from, double to, const Context& 
     forces[body].push_back({f.vertex - table.first[body], f.from, f.normal + f.friction});
   }
   for (std::size_t m = 0; m < members.size(); ++m)
-    members[m]->end(forces[m], to - from, context);
+    members[m]->end(forces[m], step, context);
+}
+
+IslandMotion::Solved IslandMotion::step(Members members, const Interval& step,
+                                        const Context& context) {
+  Solved solved;
+  solved.from = begin(members, step, context);
+  radii_->fit(solved.from);
+  report_.add(solver_->solve({step.to - step.from, parameters_, {}}, context));
+  if (step.stage == numeric::Stage::first) {
+    solved.to = positions_of(island_->table);
+    solved.forces = solver_->forces();
+  }
+  end(members, step, context);
+  return solved;
+}
+
+Stages stages_of(const Interval& step) {
+  const double middle = step.from + numeric::stage_length * (step.to - step.from);
+  return {{step.from, middle, numeric::Stage::first}, {middle, step.to, numeric::Stage::second}};
+}
+
+/// Looks whether the energy of an island has grown beyond what loads and obstacles have done, in a
+/// second stage that is solved. Where it has, inner speeds will be lowered, so that momenta stay.
+/// \param start  positions that the second stage counts from
+/// \return false: lower speeds don't suffice
+bool IslandMotion::watch_energy(const Solved& first, std::span<const Vec3> start) {
+  const BodyTable& table = island_->table;
+  EnergyGain all;
+  std::vector<std::uint8_t> gains;
+  for (ContactBody* const body : table.bodies) {
+    const std::optional<EnergyGain> gain = body->energy_gain();
+    gains.push_back(gain ? 1 : 0);
+    if (!gain)
+      continue;
+    all.gain += gain->gain;
+    all.inner += gain->inner;
+    all.scale += gain->scale;
+  }
+  const std::vector<Vec3> to = positions_of(table);
+  double stored = 0; // by barriers, at most
+  const auto take = [&](std::span<const ContactForce> forces, const auto& way) {
+    std::size_t body = 0;
+    for (const ContactForce& f : forces) {
+      while (f.vertex >= table.first[body + 1])
+        ++body;
+      const Vec3 force = f.normal + f.friction;
+      stored += norm(f.normal) * island_->activation_distance;
+      if (gains[body] == 0) // what it does to others
+        all.gain += dot(force, way(f.vertex));
+    }
+  };
+  take(first.forces,
+       [&](std::uint32_t v) { return numeric::stage_extension * (first.to[v] - first.from[v]); });
+  take(solver_->forces(), [&](std::uint32_t v) { return to[v] - start[v]; });
+  if (all.gain <= rounding * all.scale)
+    return true;
+  if (!(all.gain - all.inner <= stored))
+    return false;
+  const double factor = all.inner > all.gain ? std::sqrt(1 - all.gain / all.inner) : 0;
+  for (ContactBody* const body : table.bodies)
+    body->slow_down(factor);
+  return true;
+}
+
+/// \return false: energy would grow, nothing is ended
+bool IslandMotion::second_stage(Members members, const Solved& first, const Interval& step,
+                                const Context& context) {
+  (void)begin(members, step, context);
+  std::vector<Vec3> start = first.from;
+  for (std::size_t v = 0; v < start.size(); ++v)
+    start[v] += numeric::stage_extension * (first.to[v] - start[v]);
+  const double h = (step.to - step.from) / numeric::stage_extension;
+  report_.add(solver_->solve({h, parameters_, start}, context));
+  if (!watch_energy(first, start))
+    return false;
+  end(members, step, context);
+  return true;
+}
+
+/// A step from one time to the other, of the present order. Of second order, a first stage whose
+/// second one is not solved stays as a step of first order; where the energy would grow, the rest
+/// is one, too. \param parts  a rest that is not solved is left
+/// \return time that has been reached \throw NotSolved where nothing is taken
+double IslandMotion::take(Members members, double from, double to, bool parts,
+                          const Context& context) {
+  if (order_ == 1 || !(to > from)) {
+    (void)step(members, {from, to}, context);
+    return to;
+  }
+  const auto [first, second] = stages_of({from, to});
+  const Solved solved = step(members, first, context);
+  try {
+    if (std::ranges::all_of(members, [](const auto* m) { return m->has_first_stage(); }) &&
+        second_stage(members, solved, second, context))
+      return to;
+    ++report_.first_order;
+    (void)step(members, {second.from, to}, context);
+    return to;
+  } catch (const IntersectsAtStart&) {
+    throw;
+  } catch (const NotSolved&) {
+    if (!parts)
+      throw;
+  }
+  return second.from;
 }
 
 /// \param untried  halvings made without a try \param halvings  that are left
 /// \return how often it had to be halved
 int IslandMotion::advance_parts(Members members, double from, double to, int untried, int halvings,
                                 const Context& context) {
+  const double middle = from + (to - from) / 2;
+  const int rest = std::max(untried - 1, 0);
   if (untried == 0 || !(to > from)) {
+    const bool parts = halvings > 0 && to > from;
+    double taken = from;
     try {
-      step(members, from, to, context);
-      return 0;
+      taken = take(members, from, to, parts, context);
+      if (taken == to)
+        return 0;
     } catch (const IntersectsAtStart&) {
       throw;
     } catch (const NotSolved&) {
-      if (halvings == 0 || !(to > from))
+      if (!parts)
         throw;
     }
     ++report_.halvings;
+    if (taken > from)
+      return 1 + advance_parts(members, taken, to, rest, halvings - 1, context);
   }
-  const double middle = from + (to - from) / 2;
-  const int rest = std::max(untried - 1, 0);
   const int first = advance_parts(members, from, middle, rest, halvings - 1, context);
   const int second = advance_parts(members, middle, to, rest, halvings - 1, context);
   return 1 + std::max(first, second);
 }
 
 void IslandMotion::advance(Members members, double from, double to, StepParts& parts,
-                           const Context& context) {
+                           const Context& context, int order) {
+  order_ = order;
   const std::uint64_t before = report_.iterations;
   const int needed = advance_parts(members, from, to, parts.halvings, max_halvings, context);
   if (report_.iterations == before) // nothing touched

@@ -9,6 +9,7 @@
 #include "contact/step.h"
 #include "geometry/vec3.h"
 #include "model/model.h"
+#include "numeric/two_stages.h"
 
 #include <array>
 #include <cstddef>
@@ -53,6 +54,17 @@ ModelSurface model_surface(const model::Model& model);
 /// A point, an edge or the triangles of a convex core, at its own pose. \pre no blade
 BodySurface instrument_surface(const InstrumentShape& shape);
 
+/// A step, or a stage of a step of second order: the first one ends as a step of its own would, by
+/// backward Euler; the second one makes of both a step of second order (numeric/two_stages.h).
+struct Interval {
+  double from = 0, to = 0; ///< s; both the same: at rest
+  numeric::Stage stage = numeric::Stage::whole;
+};
+struct Stages {
+  Interval first, second;
+};
+Stages stages_of(const Interval& step);
+
 /// Makes a ContactBody for each step of something that goes on in time.
 class IslandMember {
 public:
@@ -62,16 +74,18 @@ public:
   virtual ~IslandMember() = default;
 
   /// Begins a step. A step that was begun and not ended leaves no trace when another one begins.
-  /// \param from, to  times, s; both the same: at rest
+  /// \pre a second stage: has_first_stage(), of the same step
   /// \return valid until the end of the step
-  virtual ContactBody& begin(double from, double to, const Context& context) = 0;
+  virtual ContactBody& begin(const Interval& step, const Context& context) = 0;
+  /// Whether the first stage that has ended may be followed by a second one.
+  virtual bool has_first_stage() const { return true; }
   struct Force {
     std::uint32_t vertex = 0; ///< of the member
     std::uint32_t from = 0;   ///< piece of the island
     Vec3 force;
   };
-  /// Ends the step of `h` s with these forces on the member's vertices, by ascending vertex.
-  virtual void end(std::span<const Force> forces, double h, const Context& context) = 0;
+  /// Ends the step with these forces on the member's vertices, by ascending vertex.
+  virtual void end(std::span<const Force> forces, const Interval& step, const Context& context) = 0;
 };
 
 /// Into how many parts the last steps of bodies had to be halved, so that the next one need not
@@ -96,10 +110,11 @@ public:
 
   /// Steps from one time to the other, in halves where contact is not solved. \param members  one
   /// for each surface \param parts  of the last step; becomes those for the next one
+  /// \param order  of the method, 1 or 2
   /// \throw NotSolved where the shortest step is not solved either: nothing has been ended since
   /// the last step that was; the caller rolls back
   void advance(std::span<IslandMember* const> members, double from, double to, StepParts& parts,
-               const Context& context);
+               const Context& context, int order = 1);
   void advance(std::span<IslandMember* const> members, double from, double to,
                const Context& context) {
     StepParts none;
@@ -118,7 +133,18 @@ public:
 
 private:
   using Members = std::span<IslandMember* const>;
-  void step(Members members, double from, double to, const Context& context);
+  /// A solved stage.
+  struct Solved {
+    std::vector<Vec3> from, to; ///< positions of all vertices
+    std::vector<ContactForce> forces;
+  };
+  std::vector<Vec3> begin(Members members, const Interval& step, const Context& context);
+  void end(Members members, const Interval& step, const Context& context);
+  Solved step(Members members, const Interval& step, const Context& context);
+  bool watch_energy(const Solved& first, std::span<const Vec3> start);
+  bool second_stage(Members members, const Solved& first, const Interval& step,
+                    const Context& context);
+  double take(Members members, double from, double to, bool parts, const Context& context);
   int advance_parts(Members members, double from, double to, int untried, int halvings,
                     const Context& context);
 
@@ -127,6 +153,7 @@ private:
   std::unique_ptr<StepSolver> solver_;
   std::unique_ptr<RadiusFit> radii_;
   StepReport report_;
+  int order_ = 1; ///< of the present advance
 };
 
 } // namespace gewebe::contact

@@ -59,6 +59,7 @@ void StepReport::add(const StepReport& more) {
   cuts += more.cuts;
   steps += more.steps;
   halvings += more.halvings;
+  first_order += more.first_order;
   most_iterations = std::max(most_iterations, more.most_iterations);
   pairs = std::max(pairs, more.pairs);
   vertices = std::max(vertices, more.vertices);
@@ -74,7 +75,9 @@ public:
       : island_(island), inverses_(inverses), options_(options), context_(context),
         count_(island.table.vertex_count()), begin_(read_positions(island.table)), at_(begin_),
         way_(count_), trial_(count_), gradient_(count_), d_hat_(island.activation_distance),
-        candidates_(island, broad_phase, options.parameters), energy_(island, options, begin_) {}
+        candidates_(island, broad_phase, options.parameters),
+        energy_(island, options,
+                options.start.empty() ? std::span<const Vec3>(begin_) : options.start) {}
 
   StepReport run();
   const std::vector<ContactForce>& forces() const { return pair_forces_; }

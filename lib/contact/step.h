@@ -6,10 +6,11 @@
 //   E(y) = sum over bodies of 1/2 r^T A r  +  sum over pairs of kappa w b(d^2 - d_min^2)
 //                                          +  sum over pairs of mu lambda f0(|T^T (y - y_n)|)
 //
-// with r = y - y_free. y_n are the positions at the beginning, b is the barrier of
-// contact/barrier.h, f0 the smoothed friction of contact/friction.h, whose normal forces lambda and
-// tangent planes T are lagged. Newton's method with a line search; no step passes what continuous
-// collision detection allows. Forces are the pairs' own: they sum to zero and never pull.
+// with r = y - y_free. y_n are the positions at the beginning (or StepOptions::start), b is the
+// barrier of contact/barrier.h, f0 the smoothed friction of contact/friction.h, whose normal forces
+// lambda and tangent planes T are lagged. Newton's method with a line search; no step passes what
+// continuous collision detection allows. Forces are the pairs' own: they sum to zero and never
+// pull.
 //
 // Bodies that are not linear are linearised again in each round, until a round changes nothing.
 
@@ -23,6 +24,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <span>
 #include <vector>
 
 namespace gewebe::contact {
@@ -37,10 +39,12 @@ struct Island {
   double activation_distance = 0;         ///< d_hat, mm
 };
 
-/// \param h  length of the step, s; 0: at rest
 struct StepOptions {
-  double h = 0;
+  double h = 0; ///< length of the step, s; 0: at rest
   Parameters parameters{};
+  /// Positions of all vertices that their speeds count from, where those are others than the ones
+  /// at the beginning: of a second stage, which may intersect.
+  std::span<const Vec3> start{};
 };
 
 /// Force of one body on a vertex of another.
@@ -55,6 +59,7 @@ struct StepReport {
   std::uint64_t searches = 0; ///< broad phases
   std::uint64_t cuts = 0;     ///< iterations that collision detection shortened
   std::uint64_t steps = 0, halvings = 0;
+  std::uint64_t first_order = 0;     ///< steps of second order that had to be of first
   std::uint64_t most_iterations = 0; ///< of one step
   std::size_t pairs = 0;             ///< active at the end
   std::size_t vertices = 0;          ///< unknowns of the last system over 3

@@ -13,7 +13,7 @@ namespace {
 const contact::ModelSurface& BodyMotion::collision_surface() {
   refuse();
 }
-contact::ContactBody& BodyMotion::begin_contact_step(double /*from*/, double /*to*/,
+contact::ContactBody& BodyMotion::begin_contact_step(const contact::Interval& /*step*/,
                                                      const Context& /*context*/) {
   refuse();
 }

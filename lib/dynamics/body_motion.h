@@ -44,6 +44,14 @@ struct MotionEnergies {
   double kinetic = 0, elastic = 0; ///< 1e-9 J
 };
 
+/// Steps of an integration: of at most `largest` s, of first or of second order.
+struct TimeSteps {
+  double largest = 0;
+  int order = 1;
+
+  TimeSteps(double step, int of_order = 1) : largest(step), order(of_order) {} // NOLINT: a length
+};
+
 /// State of motion of one body, and its integration.
 class BodyMotion {
 public:
@@ -57,14 +65,14 @@ public:
   /// \pre nodes exist, no displacement along an axis that the model holds
   virtual void set_load(const contact::Load& load, double time) = 0;
 
-  /// Integrates from `start` over `duration` in equal steps of at most `largest_step`. An object at
-  /// rest (see resting()) makes no step. \return number of steps
-  /// \pre duration >= 0, largest_step > 0, start >= 0
+  /// Integrates from `start` over `duration` in equal steps. An object at rest (see resting())
+  /// makes no step. \return number of steps
+  /// \pre duration >= 0, steps.largest > 0, start >= 0; steps.order is 1, or has_contact_steps()
   /// \throw Error if there would be over 1e9 steps
   /// \throw MotionError with node and time, if the state is no longer finite or an implicit step
   /// has no solution
   /// \throw Cancelled
-  virtual std::uint64_t advance(double duration, double largest_step, const Context& context,
+  virtual std::uint64_t advance(double duration, const TimeSteps& steps, const Context& context,
                                 double start) = 0;
 
   /// Whether the object was found at rest. It stays at rest until its load changes.
@@ -98,11 +106,14 @@ public:
   virtual bool has_contact_steps() const { return false; }
   /// Its collision surface, by nodes of the model. \pre has_contact_steps()
   virtual const contact::ModelSurface& collision_surface();
-  /// Begins a step with contact. A step that is not ended has no effect.
+  /// Begins a step with contact, or a stage of one. What is not ended has no effect.
   /// \return body for the contact solver, valid until the step ends
-  /// \pre has_contact_steps(), to > from
+  /// \pre has_contact_steps(), step.to > step.from
   /// \throw as advance
-  virtual contact::ContactBody& begin_contact_step(double from, double to, const Context& context);
+  virtual contact::ContactBody& begin_contact_step(const contact::Interval& step,
+                                                   const Context& context);
+  /// Whether the last step with contact was a first stage that a second one may follow.
+  virtual bool has_first_stage() const { return false; }
   /// Ends the step.
   /// \param forces  contact forces on vertices, by ascending vertex
   /// \param still  velocities and time stay as they were

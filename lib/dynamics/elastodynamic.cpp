@@ -234,12 +234,12 @@ bool Elastodynamic::found_at_rest(double h, double time) const {
   return true;
 }
 
-std::uint64_t Elastodynamic::advance(double duration, double largest_step, const Context& context,
+std::uint64_t Elastodynamic::advance(double duration, const TimeSteps& of, const Context& context,
                                      double start) {
   if (resting_ || duration == 0)
     return 0;
   // A hair more than a whole number of steps is rounding.
-  const double exact = duration / largest_step * (1 - 1e-12);
+  const double exact = duration / of.largest * (1 - 1e-12);
   if (!(exact <= max_steps))
     throw Error("a step of this length takes over 1e9 integration steps, expected fewer");
   const double count = std::max(1.0, std::ceil(exact));

@@ -23,6 +23,12 @@ void SolidContactBody::begin(double h, std::vector<VertexForce> last,
       lightest = lightest > 0 ? std::min(lightest, mass) : mass;
   stiffness_ = typical.stiffness + lightest / (h * h);
   forces_.assign(axes_, 0);
+  inner_factor_ = 1;
+}
+
+std::optional<contact::EnergyGain> SolidContactBody::energy_gain() {
+  const integrator::StageEnergy energy = motion_.stage_energy(context_);
+  return contact::EnergyGain{energy.gain, energy.inner, energy.scale};
 }
 
 void SolidContactBody::positions(std::span<Vec3> x) {

@@ -12,6 +12,7 @@
 #include <cstdint>
 #include <functional>
 #include <map>
+#include <optional>
 #include <span>
 #include <utility>
 #include <vector>
@@ -58,6 +59,10 @@ public:
   void sharpen() override { motion_.sharpen(); }
   bool solve_alone() override;
   void begin_again() override { motion_.begin_iterate_again(); }
+  std::optional<contact::EnergyGain> energy_gain() override;
+  void slow_down(double factor) override { inner_factor_ = factor; }
+  /// Of speeds at the end of the step.
+  double inner_factor() const { return inner_factor_; }
   bool is_led() const override { return motion_.moves_held(); }
   bool is_linear() const override { return false; }
   double typical_force() const override { return typical_force_; }
@@ -71,7 +76,7 @@ private:
   const std::vector<std::uint32_t>& vertices_;
   std::size_t axes_;
   Context context_;
-  double h_ = 0, typical_force_ = 0, stiffness_ = 0;
+  double h_ = 0, typical_force_ = 0, stiffness_ = 0, inner_factor_ = 1;
   std::function<void()> set_load_;
   std::vector<contact::VertexForce> last_;
   std::vector<double> step_, forces_;

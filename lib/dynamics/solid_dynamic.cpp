@@ -8,6 +8,7 @@
 #include "fem/solid_model.h"
 #include "geometry/vector_at.h"
 #include "numeric/larger.h"
+#include "numeric/two_stages.h"
 #include "text/number_text.h"
 
 #include <algorithm>
@@ -194,8 +195,9 @@ void SolidDynamic::apply_load(double time) {
   motion_shown_ = false;
 }
 
-/// All forces on the 3 n axes at this time, in the present shape.
-std::vector<double> SolidDynamic::forces_at(double time) const {
+/// All forces on the 3 n axes at this time, in the present shape, or in the one that present speeds
+/// lead to by `ahead` s.
+std::vector<double> SolidDynamic::forces_at(double time, double ahead) const {
   std::vector<double> forces = steady_;
   const auto add = [&](std::uint32_t node, const Vec3& force) {
     for (int a = 0; a < 3; ++a)
@@ -204,8 +206,14 @@ std::vector<double> SolidDynamic::forces_at(double time) const {
   for (const auto& [node, period] : state_.load->force_period)
     add(node, contact::pulse(time, period) * state_.load->force.at(node));
   const std::span<const double> places = engine_ ? engine_->places() : *state_.places;
+  const std::span<const double> speeds = engine_ ? engine_->velocity() : *state_.velocity;
   contact::press(
-      pressed_, time, [&](std::uint32_t node) { return vector_at(places, node); }, add);
+      pressed_, time,
+      [&](std::uint32_t node) {
+        const Vec3 at = vector_at(places, node);
+        return ahead > 0 ? at + ahead * vector_at(speeds, node) : at;
+      },
+      add);
   return forces;
 }
 
@@ -284,19 +292,17 @@ void SolidDynamic::begin_anew() {
   state_.last_step = 0;
 }
 
-std::uint64_t SolidDynamic::advance(double duration, double largest_step, const Context& context,
+std::uint64_t SolidDynamic::advance(double duration, const TimeSteps& of, const Context& context,
                                     double start) {
   if (state_.resting || duration == 0)
     return 0;
   // A hair more than a whole number of steps is rounding.
-  const double exact = duration / largest_step * (1 - 1e-12);
+  const double exact = duration / of.largest * (1 - 1e-12);
   if (!(exact <= max_steps))
     throw Error("a step of this length takes over 1e9 integration steps, expected fewer");
   const double count = std::max(1.0, std::ceil(exact));
-  double h = duration / count;
-  if (std::abs(h - state_.last_step) <= same_step * state_.last_step)
-    h = state_.last_step; // so that the factor serves on
-  state_.last_step = h;
+  const double length = duration / count;
+  const double h = keep_length(of.order > 1 ? numeric::stage_length * length : length);
   const auto steps = static_cast<std::uint64_t>(count);
   const auto since = std::chrono::steady_clock::now();
   (void)engine(context);
@@ -304,10 +310,15 @@ std::uint64_t SolidDynamic::advance(double duration, double largest_step, const 
   motion_shown_ = false;
   std::uint64_t taken = 0;
   const auto at = [&](std::uint64_t step) {
-    return step == steps ? start + duration : start + static_cast<double>(step) * h;
+    return step == steps ? start + duration
+                         : start + static_cast<double>(step) * (of.order > 1 ? length : h);
   };
   while (taken < steps && !state_.resting) {
-    step(h, at(taken), at(taken + 1), context);
+    const contact::Interval whole{at(taken), at(taken + 1)};
+    if (of.order > 1)
+      two_stages(h, whole, context);
+    else
+      step(h, whole, context);
     ++taken;
   }
   take_over();
@@ -318,10 +329,19 @@ std::uint64_t SolidDynamic::advance(double duration, double largest_step, const 
   return taken;
 }
 
+/// The length of a stage or a step from now on, which is that of the last one if it is about that,
+/// so that the factor serves on.
+double SolidDynamic::keep_length(double h) {
+  if (!(std::abs(h - state_.last_step) <= same_step * state_.last_step))
+    state_.last_step = h;
+  return state_.last_step;
+}
+
 /// Forces, and where held axes go: the target, or nothing where they stay.
-std::vector<double> SolidDynamic::begin_step(double from, double to) {
+std::vector<double> SolidDynamic::begin_step(const contact::Interval& step) {
   integrator::SolidMotion& moving = *engine_;
-  const std::vector<double> forces = forces_at(to);
+  const auto [from, to, stage] = step;
+  const std::vector<double> forces = forces_at(to, stage == numeric::Stage::whole ? 0 : to - from);
   for (std::size_t axis = 0; axis < forces.size(); ++axis)
     if (!(std::abs(forces[axis]) <= largest_force))
       throw MotionError(static_cast<std::uint32_t>(axis / 3), to,
@@ -378,22 +398,43 @@ void SolidDynamic::settle(std::span<const double> before, double to, double room
                  std::vector<double>(before.size()), context);
 }
 
-void SolidDynamic::step(double h, double from, double to, const Context& context) {
+/// A step of h, or a stage of one, without settling.
+void SolidDynamic::move(double h, const contact::Interval& step, const Context& context) {
   integrator::SolidMotion& moving = *engine_;
-  const std::vector<double> before(moving.places().begin(), moving.places().end());
-  const std::vector<double> target = begin_step(from, to);
+  const std::vector<double> target = begin_step(step);
   if (all_held_) {
-    hold_all(target, h, context);
-  } else {
-    if (!target.empty())
-      moving.move_held(target);
-    const integrator::SolidStep took = moving.step(h, context);
-    counts_.rounds += static_cast<std::uint64_t>(took.rounds);
-    counts_.factors += static_cast<std::uint64_t>(took.factorisations);
-    counts_.unfinished += took.left <= options_.tolerance ? 0 : 1;
-    counts_.limited += took.limited ? 1 : 0;
+    hold_all(target, step.stage == numeric::Stage::whole ? h : step.to - step.from, context);
+    return;
   }
-  settle(before, to, 0, context);
+  if (!target.empty())
+    moving.move_held(target);
+  const integrator::SolidStep took = moving.step(h, context, step.stage);
+  counts_.rounds += static_cast<std::uint64_t>(took.rounds);
+  counts_.factors += static_cast<std::uint64_t>(took.factorisations);
+  counts_.unfinished += took.left <= options_.tolerance ? 0 : 1;
+  counts_.limited += took.limited ? 1 : 0;
+}
+
+void SolidDynamic::step(double h, const contact::Interval& step, const Context& context) {
+  const std::vector<double> before(engine_->places().begin(), engine_->places().end());
+  move(h, step, context);
+  settle(before, step.to, 0, context);
+}
+
+/// A step of second order by two stages of h.
+void SolidDynamic::two_stages(double h, const contact::Interval& step, const Context& context) {
+  const std::vector<double> before(engine_->places().begin(), engine_->places().end());
+  const auto [first, second] = contact::stages_of(step);
+  move(h, first, context);
+  if (has_first_stage())
+    move(h, second, context);
+  else // by recovery, of first order
+    move(keep_length(second.to - second.from), {second.from, second.to}, context);
+  settle(before, step.to, 0, context);
+}
+
+bool SolidDynamic::has_first_stage() const {
+  return all_held_ || (engine_ && engine_->has_first_stage(state_.last_step));
 }
 
 // ---- contact
@@ -405,20 +446,19 @@ const contact::ModelSurface& SolidDynamic::collision_surface() {
   return *surface_;
 }
 
-contact::ContactBody& SolidDynamic::begin_contact_step(double from, double to,
+contact::ContactBody& SolidDynamic::begin_contact_step(const contact::Interval& step,
                                                        const Context& context) {
   integrator::SolidMotion& moving = engine(context);
-  double h = to - from;
-  if (std::abs(h - state_.last_step) <= same_step * state_.last_step)
-    h = state_.last_step; // so that the factor serves on
-  state_.last_step = h;
-  from_ = from;
-  to_ = to;
+  const bool second = step.stage == numeric::Stage::second;
+  const double h = second ? state_.last_step : keep_length(step.to - step.from);
+  step_ = step;
+  if (!second)
+    begun_.assign(moving.places().begin(), moving.places().end());
   state_.version = ++versions_;
   if (!body_)
     body_ =
         std::make_unique<SolidContactBody>(moving, collision_surface().node, model_.nodes.size());
-  std::vector<double> target = begin_step(from, to);
+  std::vector<double> target = begin_step(step);
   if (all_held_) {
     std::vector<Vec3> before, behind;
     for (const std::uint32_t node : collision_surface().node) {
@@ -432,7 +472,7 @@ contact::ContactBody& SolidDynamic::begin_contact_step(double from, double to,
   }
   if (!target.empty())
     moving.move_held(target);
-  moving.begin_step(h, context);
+  moving.begin_step(h, context, 0, step.stage);
   if (!typical_)
     typical_ = contact::typical_contact(model_);
   contact::TypicalContact typical = *typical_;
@@ -444,7 +484,7 @@ contact::ContactBody& SolidDynamic::begin_contact_step(double from, double to,
 void SolidDynamic::end_contact_step(std::span<const contact::VertexForce> forces, bool still,
                                     const Context& context) {
   integrator::SolidMotion& moving = *engine_;
-  const std::vector<double> before(moving.places().begin(), moving.places().end());
+  const double length = step_.to - step_.from;
   integrator::SolidStep took;
   viscous::MemoryState was; // no time passes while surfaces part
   if (all_held_) {
@@ -453,17 +493,17 @@ void SolidDynamic::end_contact_step(std::span<const contact::VertexForce> forces
       for (int a = 0; a < 3; ++a)
         all[axis_of(collision_surface().node[f.vertex], a)] += f.force[a];
     moving.set_load(all);
-    hold_all(target_, to_ - from_, context);
+    hold_all(target_, length, context);
   } else {
     if (still)
       was = moving.memory();
-    took = moving.end_step(body_->forces(), context);
+    took = moving.end_step(body_->forces(), context, body_->inner_factor());
   }
   state_.contact.assign(forces.begin(), forces.end());
   state_.version = ++versions_;
   state_.resting = false;
   motion_shown_ = false;
-  ++counts_.steps;
+  counts_.steps += step_.stage == numeric::Stage::first ? 0 : 1;
   counts_.rounds += static_cast<std::uint64_t>(took.rounds);
   counts_.factors += static_cast<std::uint64_t>(took.factorisations);
   if (still) {
@@ -474,10 +514,14 @@ void SolidDynamic::end_contact_step(std::span<const contact::VertexForce> forces
     take_over();
     return;
   }
-  const double room = rest_in_contact * (to_ - from_);
-  settle(before, to_, forces.empty() ? 0 : room, context);
+  counts_.limited += body_ && body_->inner_factor() < 1 ? 1 : 0;
+  if (step_.stage != numeric::Stage::first) {
+    const double whole =
+        step_.stage == numeric::Stage::second ? length / (1 - numeric::stage_length) : length;
+    settle(begun_, step_.to, forces.empty() ? 0 : rest_in_contact * whole, context);
+  }
   take_over();
-  state_.time = to_;
+  state_.time = step_.to;
 }
 
 /// An eighth of the load of a body, or of the force that would stop a free one in a step; else

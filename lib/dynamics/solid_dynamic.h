@@ -41,7 +41,7 @@ public:
                const Context& context);
 
   void set_load(const contact::Load& load, double time) override;
-  std::uint64_t advance(double duration, double largest_step, const Context& context,
+  std::uint64_t advance(double duration, const TimeSteps& steps, const Context& context,
                         double start = 0) override;
 
   /// The object is at rest if two steps in a row moved no node by more than 1e-9 of the largest
@@ -62,7 +62,9 @@ public:
 
   bool has_contact_steps() const override { return true; }
   const contact::ModelSurface& collision_surface() override;
-  contact::ContactBody& begin_contact_step(double from, double to, const Context& context) override;
+  contact::ContactBody& begin_contact_step(const contact::Interval& step,
+                                           const Context& context) override;
+  bool has_first_stage() const override;
   void end_contact_step(std::span<const contact::VertexForce> forces, bool still,
                         const Context& context) override;
   void clear_contact() override;
@@ -93,11 +95,14 @@ private:
   void take_over();
   void begin_anew();
   integrator::SolidMotion& engine(const Context& context);
-  std::vector<double> forces_at(double time) const;
+  std::vector<double> forces_at(double time, double ahead = 0) const;
   Vec3 held_at(std::uint32_t node, double time) const;
   double typical_force(double h, double strained) const;
-  void step(double h, double from, double to, const Context& context);
-  std::vector<double> begin_step(double from, double to);
+  double keep_length(double h);
+  void move(double h, const contact::Interval& step, const Context& context);
+  void step(double h, const contact::Interval& step, const Context& context);
+  void two_stages(double h, const contact::Interval& step, const Context& context);
+  std::vector<double> begin_step(const contact::Interval& step);
   void hold_all(std::span<const double> target, double h, const Context& context);
   void settle(std::span<const double> before, double to, double room, const Context& context);
 
@@ -124,7 +129,8 @@ private:
   std::unique_ptr<contact::HeldBody> held_body_;   ///< if all nodes are held
   std::vector<double> load_;                       ///< forces of the step, 3 n
   std::vector<double> target_; ///< displacements at its end, if all nodes are held
-  double from_ = 0, to_ = 0;   ///< of the step with contact that was begun
+  contact::Interval step_;     ///< with contact that was begun
+  std::vector<double> begun_;  ///< places where it began, or the first one of its stages
   SolidStepCounts counts_;
   mutable std::vector<NodeMotion> motion_;
   mutable bool motion_shown_ = false;

@@ -257,6 +257,23 @@ void CorotationalSolid::restore_strains(std::shared_ptr<const void> strains) {
   });
 }
 
+void CorotationalSolid::extend_strains(const std::shared_ptr<const void>& start, double factor) {
+  state_->with([&]<class Of>(Of& of) {
+    using Strains = typename Of::Strains;
+    const Strains& from = *std::static_pointer_cast<const Strains>(start);
+    auto extended = std::make_shared<Strains>(*of.before);
+    for (std::size_t n = 0; n < from.size(); ++n)
+      for (std::size_t c = 0; c < std::size((*extended)[n].value); ++c)
+        for (std::size_t lane = 0; lane < 4; ++lane) {
+          const double first = from[n].value[c][lane];
+          double& value = (*extended)[n].value[c][lane];
+          value = first + factor * (value - first);
+        }
+    of.before = std::move(extended);
+    of.remembered = false;
+  });
+}
+
 void CorotationalSolid::node_rotations(std::span<double> rotations, const Context& context) {
   State& s = *state_;
   const CorotationalKernel& kernel = corotational_kernel(context.cpu);

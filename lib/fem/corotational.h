@@ -72,6 +72,9 @@ public:
   /// The strains that damping counts from, which are not written again, and those of earlier times.
   std::shared_ptr<const void> strains() const;
   void restore_strains(std::shared_ptr<const void> strains);
+  /// Damping counts from start + factor (strains() - start) from then on. \param start  strains()
+  /// of an earlier time
+  void extend_strains(const std::shared_ptr<const void>& start, double factor);
   /// Of each node the rotation nearest to the mean of its elements', by rows, 9 n: as in the last
   /// evaluate() with turns. That of a node of no element is none.
   void node_rotations(std::span<double> rotations, const Context& context);

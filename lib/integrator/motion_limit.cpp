@@ -46,7 +46,29 @@ void rigid_parts(const MotionBody& body, const MotionState& state, Numbers& movi
   }
 }
 
+/// What is left without these, and without axes that are held.
+Numbers inner_speeds(const MotionBody& body, const MotionState& state) {
+  Numbers moving(body.axes()), turning(body.axes());
+  if (!state.any_held())
+    rigid_parts(body, state, moving, turning);
+  Numbers inner = state.velocity;
+  for (std::size_t axis = 0; axis < body.axes(); ++axis)
+    if (state.held[axis] != 0)
+      inner[axis] = 0;
+  add(inner, -1, moving);
+  add(inner, -1, turning);
+  return inner;
+}
+
 } // namespace
+
+double inner_energy(const MotionBody& body, const MotionState& state) {
+  return motion_energy(body, inner_speeds(body, state));
+}
+
+void slow_inner(const MotionBody& body, MotionState& state, double factor) {
+  add(state.velocity, factor - 1, inner_speeds(body, state));
+}
 
 bool limit_energy(const MotionBody& body, MotionState& state, double elastic, double before,
                   double rounding) {

@@ -5,6 +5,12 @@
 
 namespace gewebe::integrator {
 
+/// Of the speeds that neither move nor turn the body as a whole; of a held body, of all of axes
+/// that are not held.
+double inner_energy(const MotionBody& body, const MotionState& state);
+/// Multiplies these speeds.
+void slow_inner(const MotionBody& body, MotionState& state, double factor);
+
 /// Lowers speeds such that energy (of motion, `elastic`, and of the load) is `before` at most,
 /// `rounding` left aside; those of held axes stay. Lowers first what neither moves nor turns the
 /// body as a whole (a held body has no other parts), then what turns it, then the rest.

@@ -13,15 +13,17 @@
 namespace gewebe::integrator {
 
 MotionObjective::MotionObjective(const MotionBody& body, const MotionState& state,
-                                 SolidEnergy& energy, double h, const SolidMotionOptions& options)
-    : body_(body), state_(state), energy_(energy), step_(h), damping_(options.damping / h),
-      mass_(body.nodes()), ahead_(state.place) {
+                                 const MotionStart& start, SolidEnergy& energy, double h,
+                                 const SolidMotionOptions& options)
+    : body_(body), state_(state), start_(start), energy_(energy), step_(h),
+      damping_(options.damping / h), mass_(body.nodes()),
+      ahead_(start.place.begin(), start.place.end()) {
   for (std::size_t i = 0; i < body.nodes(); ++i)
     mass_[i] = body.masses[i] * body.inertia(i, h);
   if (!std::isfinite(h))
     return; // at rest, without inertia
   for (std::size_t axis = 0; axis < body.axes(); ++axis)
-    ahead_[axis] += h / (1 + body.drag[axis / 3] * h) * state.velocity[axis];
+    ahead_[axis] += h / (1 + body.drag[axis / 3] * h) * start.velocity[axis];
 }
 
 void MotionObjective::evaluate(MotionPoint& point, const Context& context, bool turns) const {

@@ -28,11 +28,16 @@ struct RigidChange {
   double largest = 0; ///< bound on the displacement of a node, mm
 };
 
+/// Where the inertia of a step begins: the state, or what a second stage extrapolates.
+struct MotionStart {
+  std::span<const double> place, velocity;
+};
+
 class MotionObjective {
 public:
   /// Of a step of h. \pre all outlive this; the state doesn't change meanwhile
-  MotionObjective(const MotionBody& body, const MotionState& state, SolidEnergy& energy, double h,
-                  const SolidMotionOptions& options);
+  MotionObjective(const MotionBody& body, const MotionState& state, const MotionStart& start,
+                  SolidEnergy& energy, double h, const SolidMotionOptions& options);
 
   /// At point.at, with what MotionQuick::turn() needs, if `turns`. Counted by evaluations().
   void evaluate(MotionPoint& point, const Context& context, bool turns = false) const;
@@ -51,6 +56,7 @@ public:
 
   const MotionBody& body() const noexcept { return body_; }
   const MotionState& state() const noexcept { return state_; }
+  const MotionStart& start() const noexcept { return start_; }
   SolidEnergy& energy() const noexcept { return energy_; }
   double step() const noexcept { return step_; }
   double damping() const noexcept { return damping_; } ///< per stiffness
@@ -61,6 +67,7 @@ private:
 
   const MotionBody& body_;
   const MotionState& state_;
+  MotionStart start_;
   SolidEnergy& energy_;
   double step_, damping_;
   Numbers mass_;  ///< by node, times its inertia

@@ -95,6 +95,12 @@ double MotionSprings::evaluate(const Numbers& at, double per_time, std::span<dou
   return energies.elastic + energies.damped;
 }
 
+void MotionSprings::extend(const CopyOnWrite<Numbers>& start, double factor) {
+  Numbers& lengths = kept_.write();
+  for (std::size_t k = 0; k < lengths.size(); ++k)
+    lengths[k] = (*start)[k] + factor * (lengths[k] - (*start)[k]);
+}
+
 linalg::StiffnessMatrix MotionSprings::with_bound(const linalg::StiffnessMatrix& of_elements,
                                                   double per_time) const {
   return with_blocks(of_elements, springs_, [&](std::size_t k) {

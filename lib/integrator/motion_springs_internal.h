@@ -33,6 +33,8 @@ public:
   /// Lengths that dampers count from.
   const CopyOnWrite<Numbers>& kept() const noexcept { return kept_; }
   void restore(CopyOnWrite<Numbers> kept) { kept_ = std::move(kept); }
+  /// Dampers count from start + factor (kept() - start). \param start  kept() of an earlier time
+  void extend(const CopyOnWrite<Numbers>& start, double factor);
 
   /// A matrix plus that of the springs with all they have along every axis, whatever their
   /// direction: it bounds their tangent wherever they turn to.

@@ -45,6 +45,11 @@ void SolidEnergy::restore(const KeptStep& kept) {
   bubbles_ = kept.bubbles;
 }
 
+void SolidEnergy::extend(const KeptStep& start, double factor) {
+  frames_.extend_strains(start.strains, factor);
+  springs_.extend(start.lengths, factor);
+}
+
 void SolidEnergy::forget_bubbles() {
   std::ranges::fill(new_bubbles_, Vec3{});
   if (!new_bubbles_.empty())

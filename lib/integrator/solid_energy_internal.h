@@ -46,6 +46,8 @@ public:
   void keep();
   KeptStep kept() const { return {frames_.strains(), springs_.kept(), bubbles_}; }
   void restore(const KeptStep& kept);
+  /// Damping counts from start + factor (kept() - start). \param start  kept() of an earlier time
+  void extend(const KeptStep& start, double factor);
   /// Bubbles are sought from rest.
   void forget_bubbles();
   /// At rest bubbles are sought from those of the last evaluation: there is no step to begin again.

@@ -9,6 +9,7 @@
 #include "integrator/motion_objective_internal.h"
 #include "integrator/motion_quick_internal.h"
 #include "integrator/motion_recovery_internal.h"
+#include "integrator/motion_stages_internal.h"
 #include "integrator/motion_tangent_internal.h"
 #include "integrator/solid_energy_internal.h"
 #include "viscous/solid_memory.h"
@@ -64,6 +65,7 @@ struct SolidMotion::State {
   double elastic = 0;      ///< energy of now.place
   double allowed = 0;      ///< at the end of the last step, of all kinds
   MotionForecast forecast; ///< of steps of `last_step`
+  MotionStages stages;
   double last_step = 0;
   Numbers target; ///< of held axes in the next step: displacements
   bool moved = false;
@@ -110,6 +112,13 @@ struct SolidMotion::State {
     now = {body.rest, Numbers(axes), Numbers(axes), std::vector<std::uint8_t>(axes)};
     target = reactions = Numbers(axes);
   }
+  MotionForecast& present_forecast() { return stages.is_second() ? stages.forecast() : forecast; }
+  void clear_forecasts() {
+    forecast.clear();
+    stages.forecast().clear();
+  }
+  void begin_stage(numeric::Stage stage);
+  Numbers go_on(const Numbers& at, double h, const MotionStart& start);
   void recall(double h, const Context& context);
   void remember(const Context& context);
   void stand(double elapsed, const Context& context);
@@ -190,6 +199,27 @@ void SolidMotion::State::stand(double elapsed, const Context& context) {
   elastic = energy.evaluate(now.place, {}, forces, context);
   energy.keep();
   remember(context);
+}
+
+/// Begins a stage, or a step of its own.
+void SolidMotion::State::begin_stage(numeric::Stage stage) {
+  Numbers places;
+  if (stage == numeric::Stage::second && moved) {
+    places = body.rest;
+    add(places, 1, target);
+  }
+  stages.begin(stage, now, places, energy);
+}
+
+/// Speeds at the end of a step that ends at `at`. \return accelerations
+Numbers SolidMotion::State::go_on(const Numbers& at, double h, const MotionStart& start) {
+  Numbers acceleration(body.axes());
+  for (std::size_t axis = 0; axis < body.axes(); ++axis) {
+    const double speed = (at[axis] - start.place[axis]) / h;
+    acceleration[axis] = (speed - start.velocity[axis]) / h;
+    now.velocity[axis] = speed;
+  }
+  return acceleration;
 }
 
 /// Speeds at the end of a step.
@@ -278,7 +308,7 @@ SolidStep SolidMotion::State::step_softly(double h, const Context& context) {
   elastic = whole;
   energy.keep();
   quick.forget();
-  forecast.clear();
+  clear_forecasts();
   recovery.end();
   return step;
 }
@@ -400,11 +430,11 @@ MotionPoint SolidMotion::State::search(const MotionObjective& objective, SolidSt
   if (!std::isfinite(h))
     return search_rest(objective, step, context);
   MotionPoint found;
-  found.at = now.place;
-  add(found.at, h, now.velocity);
+  found.at.assign(objective.start().place.begin(), objective.start().place.end());
+  add(found.at, h, objective.start().velocity);
   if (last_step != h)
-    forecast.clear();
-  forecast.add_to(found.at, h * h, context);
+    clear_forecasts();
+  present_forecast().add_to(found.at, h * h, context);
   for (std::size_t axis = 0; axis < body.axes(); ++axis)
     if (now.held[axis] != 0)
       found.at[axis] = moved ? body.rest[axis] + target[axis] : now.place[axis];
@@ -443,7 +473,9 @@ void SolidMotion::hold(std::span<const std::uint8_t> held) {
       continue;
     s.now.velocity[axis] = 0;
     s.forecast.hold(axis);
+    s.stages.forecast().hold(axis);
   }
+  s.stages.forget();
   s.tangent.renew();
   s.keeps_tangent = false;
   if (s.recovery.on())
@@ -456,20 +488,29 @@ void SolidMotion::move_held(std::span<const double> displacement) {
   s.moved = true;
 }
 
-SolidStep SolidMotion::step(double h, const Context& context) {
+SolidStep SolidMotion::step(double h, const Context& context, numeric::Stage stage) {
   State& s = *state_;
-  s.recovery.look(s.body, s.now, s.elastic, h, s.options, context);
-  if (s.recovery.on())
+  const bool second = stage == numeric::Stage::second;
+  s.stages.abandon(s.energy);
+  if (!second)
+    s.recovery.look(s.body, s.now, s.elastic, h, s.options, context);
+  if (s.recovery.on()) {
+    s.stages.forget();
     return s.step_softly(h, context);
-  s.recall(h, context);
+  }
+  s.begin_stage(stage);
+  s.recall(second ? numeric::stage_extension * h : h, context);
   SolidStep step;
   step.change = step.left = HUGE_VAL;
   if (!s.options.reference)
     step.factorisations +=
         s.quick.prepare(s.body, s.energy.springs(), s.now.held, h, s.options, context);
-  s.allowed = motion_energy(s.body, s.now.velocity) + s.elastic -
-              work_of_load(s.body, s.now.load, s.now.place);
-  const MotionObjective objective(s.body, s.now, s.energy, h, s.options);
+  const double before = s.elastic;
+  if (!second)
+    s.allowed = motion_energy(s.body, s.now.velocity) + before -
+                work_of_load(s.body, s.now.load, s.now.place);
+  const MotionStart start = s.stages.start(s.now);
+  const MotionObjective objective(s.body, s.now, start, s.energy, h, s.options);
   MotionPoint found = s.search(objective, step, context);
   if (!std::isfinite(found.value))
     throw Error("the motion of a solid is no longer finite, expected a smaller load or timestep");
@@ -480,18 +521,21 @@ SolidStep SolidMotion::step(double h, const Context& context) {
       s.reactions[axis] = 0;
   if (!s.now.any_held())
     objective.keep_both_momenta(found);
+  if (second)
+    s.allowed =
+        s.stages.allowed(s.now, found.at, before) - work_of_load(s.body, s.now.load, found.at);
+  else
+    for (std::size_t axis = 0; axis < s.body.axes(); ++axis)
+      s.allowed += s.reactions[axis] * (found.at[axis] - s.now.place[axis]);
+  // Of the last evaluation, momentum kept by a translation alone.
+  const double after = s.energy.elastic();
+  MotionForecast& forecast = s.present_forecast();
+  s.stages.end(s.body, h, s.now, found.at, s.energy, before, after);
   s.energy.keep();
-  Numbers acceleration(s.body.axes());
-  for (std::size_t axis = 0; axis < s.body.axes(); ++axis) {
-    const double speed = (found.at[axis] - s.now.place[axis]) / h;
-    acceleration[axis] = (speed - s.now.velocity[axis]) / h;
-    s.allowed += s.reactions[axis] * (found.at[axis] - s.now.place[axis]);
-    s.now.velocity[axis] = speed;
-  }
-  s.forecast.add(std::move(acceleration), s.body.masses, context);
+  forecast.add(s.go_on(found.at, h, start), s.body.masses, context);
   s.now.place = std::move(found.at);
-  s.elastic = s.energy.elastic(); // of the last evaluation, momentum kept by a translation alone
-  if (!s.moved)
+  s.elastic = after;
+  if (!s.moved && stage != numeric::Stage::first)
     s.limit(step);
   s.remember(context);
   step.evaluations = objective.evaluations();
@@ -520,15 +564,23 @@ double SolidMotion::condition(const Context& context) {
   return s.quick.condition();
 }
 
-void SolidMotion::begin_step(double h, const Context& context, double elapsed) {
+bool SolidMotion::has_first_stage(double h) const noexcept {
+  return !state_->recovery.on() && state_->stages.has_first(h);
+}
+
+void SolidMotion::begin_step(double h, const Context& context, double elapsed,
+                             numeric::Stage stage) {
   State& s = *state_;
+  const bool second = stage == numeric::Stage::second;
   s.open.reset();
+  s.stages.abandon(s.energy);
   s.energy.set_at_rest(!std::isfinite(h));
-  if (std::isfinite(h))
-    s.recovery.look(s.body, s.now, s.elastic, h, s.options, context);
-  else
+  if (!std::isfinite(h))
     s.recovery.end();
+  else if (!second)
+    s.recovery.look(s.body, s.now, s.elastic, h, s.options, context);
   if (s.recovery.on()) {
+    s.stages.forget();
     SolidMotion& soft = s.recovery.soft();
     soft.set_load(s.now.load);
     if (s.moved)
@@ -536,13 +588,15 @@ void SolidMotion::begin_step(double h, const Context& context, double elapsed) {
     soft.begin_step(h, context);
     return;
   }
-  s.recall(std::isfinite(h) ? h : elapsed, context);
+  s.begin_stage(stage);
+  s.recall(second ? numeric::stage_extension * h : std::isfinite(h) ? h : elapsed, context);
   const int made = s.quick.prepare(s.body, s.energy.springs(), s.now.held, h, s.options, context);
-  s.open.emplace(State::Open{.objective = MotionObjective(s.body, s.now, s.energy, h, s.options),
-                             .point = {},
-                             .found = {},
-                             .base = {},
-                             .step = {}});
+  s.open.emplace(State::Open{
+      .objective = MotionObjective(s.body, s.now, s.stages.start(s.now), s.energy, h, s.options),
+      .point = {},
+      .found = {},
+      .base = {},
+      .step = {}});
   State::Open& open = *s.open;
   open.found.at = s.now.place;
   open.counts.factorisations = made;
@@ -567,8 +621,11 @@ void SolidMotion::linearise_step(std::span<double> step, std::span<const double>
     point = open.found;
   } else {
     point.at = open.base;
-    if (open.fresh && !at_rest)
-      add(point.at, open.objective.step(), s.now.velocity);
+    if (open.fresh && !at_rest) {
+      const MotionStart& start = open.objective.start();
+      point.at.assign(start.place.begin(), start.place.end());
+      add(point.at, open.objective.step(), start.velocity);
+    }
     for (std::size_t axis = 0; axis < s.body.axes(); ++axis)
       if (s.now.held[axis] != 0)
         point.at[axis] = s.moved ? s.body.rest[axis] + s.target[axis] : s.now.place[axis];
@@ -754,7 +811,29 @@ std::span<const double> SolidMotion::iterate() const noexcept {
                                : std::span<const double>(state_->open->found.at);
 }
 
-SolidStep SolidMotion::end_step(std::span<const double> forces, const Context& context) {
+StageEnergy SolidMotion::stage_energy(const Context& context) {
+  State& s = *state_;
+  if (s.moved)
+    return {};
+  State::Open& open = *s.open;
+  if (!std::exchange(open.evaluated, true))
+    open.objective.evaluate(open.found, context, true);
+  MotionState ends = s.now;
+  ends.place = open.found.at;
+  const MotionStart& start = open.objective.start();
+  for (std::size_t axis = 0; axis < s.body.axes(); ++axis)
+    ends.velocity[axis] = (open.found.at[axis] - start.place[axis]) / open.objective.step();
+  const double kinetic = motion_energy(s.body, ends.velocity), elastic = s.energy.elastic(),
+               allowed = s.stages.allowed(s.now, open.found.at, s.elastic);
+  StageEnergy energy;
+  energy.gain = kinetic + elastic - allowed;
+  energy.scale = kinetic + elastic + std::abs(allowed);
+  energy.inner = inner_energy(s.body, ends);
+  return energy;
+}
+
+SolidStep SolidMotion::end_step(std::span<const double> forces, const Context& context,
+                                double inner) {
   State& s = *state_;
   if (s.recovery.on()) {
     SolidMotion& soft = s.recovery.soft();
@@ -768,7 +847,7 @@ SolidStep SolidMotion::end_step(std::span<const double> forces, const Context& c
         s.elastic = whole;
         s.energy.keep();
         s.quick.forget();
-        s.forecast.clear();
+        s.clear_forecasts();
         s.recovery.end();
       }
     }
@@ -782,24 +861,27 @@ SolidStep SolidMotion::end_step(std::span<const double> forces, const Context& c
   open.objective.evaluate(open.found, context);
   if (!std::isfinite(open.found.value))
     throw Error("the motion of a solid is no longer finite, expected a smaller load or timestep");
+  const double after = s.energy.elastic();
+  const MotionStart& start = open.objective.start();
+  MotionForecast& forecast = s.present_forecast();
+  s.stages.end(s.body, h, s.now, open.found.at, s.energy, s.elastic, after);
   s.energy.keep();
   s.reactions = open.found.forces;
-  Numbers acceleration(s.body.axes());
   for (std::size_t axis = 0; axis < s.body.axes(); ++axis) {
     if (s.now.held[axis] == 0)
       s.reactions[axis] = 0;
     else
       s.reactions[axis] -= forces.empty() ? 0 : forces[axis];
-    const double speed = (open.found.at[axis] - s.now.place[axis]) / h;
-    acceleration[axis] = (speed - s.now.velocity[axis]) / h;
-    s.now.velocity[axis] = speed;
   }
+  Numbers acceleration = s.go_on(open.found.at, h, start);
   if (s.last_step != h)
-    s.forecast.clear();
+    s.clear_forecasts();
   if (std::isfinite(h))
-    s.forecast.add(std::move(acceleration), s.body.masses, context);
+    forecast.add(std::move(acceleration), s.body.masses, context);
   s.now.place = std::move(open.found.at);
-  s.elastic = s.energy.elastic();
+  s.elastic = after;
+  if (inner != 1)
+    slow_inner(s.body, s.now, inner);
   s.remember(context);
   s.last_step = h;
   s.moved = false;
@@ -842,7 +924,9 @@ void SolidMotion::restore(std::span<const double> places, std::span<const double
   s.recovery.end();
   std::ranges::copy(places, s.now.place.begin());
   std::ranges::copy(velocity, s.now.velocity.begin());
-  s.forecast.clear();
+  s.clear_forecasts();
+  s.stages.abandon(s.energy);
+  s.stages.forget();
   s.energy.forget_bubbles();
   s.last_step = 0;
   s.stand(elapsed, context);
@@ -862,7 +946,7 @@ struct SolidMotion::Past {
   KeptStep energy;
   viscous::MemoryState memory;
   double elastic = 0, last_step = 0;
-  MotionForecast forecast;
+  MotionForecast forecast, second_forecast;
   MotionQuick::Past quick;
   std::optional<MotionTangent::Past> tangent; ///< if it serves on
   MotionRecovery::Past recovery;
@@ -875,6 +959,7 @@ std::shared_ptr<const SolidMotion::Past> SolidMotion::past() const {
                                           .elastic = s.elastic,
                                           .last_step = s.last_step,
                                           .forecast = s.forecast,
+                                          .second_forecast = s.stages.forecast(),
                                           .quick = s.quick.past(),
                                           .tangent = {},
                                           .recovery = s.recovery.past()});
@@ -888,6 +973,8 @@ void SolidMotion::restore(std::span<const double> places, std::span<const double
                           const Context& context) {
   State& s = *state_;
   s.open.reset();
+  s.stages.abandon(s.energy);
+  s.stages.forget();
   s.moved = false;
   std::ranges::copy(places, s.now.place.begin());
   std::ranges::copy(velocity, s.now.velocity.begin());
@@ -897,6 +984,7 @@ void SolidMotion::restore(std::span<const double> places, std::span<const double
   s.elastic = past.elastic;
   s.last_step = past.last_step;
   s.forecast = past.forecast;
+  s.stages.forecast() = past.second_forecast;
   s.quick.restore(past.quick, s.body, s.energy.springs(), s.options, context);
   s.keeps_tangent = past.tangent.has_value();
   if (past.tangent)

@@ -12,6 +12,13 @@
 // damped. The minimum is sought downhill in this function alone, so that a body that was turned
 // inside out finds back, whatever the tolerance is.
 //
+// Steps of second order are two such steps of gamma h (numeric/two_stages.h): the second one counts
+// inertia, damping and friction from places, speeds and strains extrapolated from the first one,
+// and starts where the first one ended, which does not intersect. Energy may grow in an impact that
+// is not resolved, by up to about a tenth. Then speeds that neither move nor turn a body as a whole
+// are lowered, so that momentum stays; where that does not suffice in an island, the first stage
+// stays and the rest of the step is one of backward Euler (contact/island.cpp).
+//
 // The quick way is a quasi-Newton method with a constant matrix (Liu, Bouaziz, Kavan, Quasi-Newton
 // methods for real-time simulation of hyperelastic materials, ACM TOG 36(3), 2017). The matrix is A
 // = M (1/h² + drag/h) + (1 + damping/h) K at rest, factored once for each length of step and set of
@@ -56,6 +63,7 @@
 
 #include "base/context.h"
 #include "fem/assembly.h"
+#include "numeric/two_stages.h"
 #include "tetrahedra/tet_mesh.h"
 #include "viscous/solid_memory.h"
 
@@ -134,6 +142,13 @@ struct SolidStep {
   bool limited = false;   ///< speeds were lowered, see SolidMotion::step
 };
 
+/// What a step of second order has come to, g mm²/s².
+struct StageEnergy {
+  double gain = 0;  ///< of energy, beyond the work of the load
+  double inner = 0; ///< energy of the speeds that neither move nor turn the body as a whole
+  double scale = 0; ///< of energies, for rounding
+};
+
 /// Damping per stiffness that lets a motion of this frequency (Hz) decay by `ratio` of the critical
 /// one. \pre frequency > 0, ratio >= 0
 double damping_per_stiffness(double ratio, double frequency);
@@ -180,7 +195,14 @@ public:
   /// nowhere changes its momentum by the load alone, and keeps its angular momentum to first order
   /// in h.
   /// \pre h > 0 \throw Error if the state is no longer finite, or as Factor; Cancelled
-  SolidStep step(double h, const Context& context);
+  /// \param stage  of a step of second order: the first one is a step of h, whose load and targets
+  /// are those of its end. The second one, of the same h, goes on by (1 + sqrt 2) h and makes of
+  /// both a step of second order, over which energy is watched. \pre a second one:
+  /// has_first_stage(h)
+  SolidStep step(double h, const Context& context, numeric::Stage stage = numeric::Stage::whole);
+  /// Whether the last step was a first stage of h that a second one may follow: not where it went
+  /// by recovery.
+  bool has_first_stage(double h) const noexcept;
 
   std::span<const double> places() const noexcept;   ///< of nodes, 3 n, mm
   std::vector<double> displacement() const;          ///< 3 n, mm
@@ -223,7 +245,9 @@ public:
   /// An open step is abandoned without a trace. \pre h > 0, set_load and move_held were called for
   /// this step \throw as step
   /// \param elapsed  as of settle(), of an infinite h
-  void begin_step(double h, const Context& context, double elapsed = 0);
+  /// \param stage  as of step(); a second one that is abandoned leaves the first one, as a step
+  void begin_step(double h, const Context& context, double elapsed = 0,
+                  numeric::Stage stage = numeric::Stage::whole);
   /// Builds the model around the iterate, at first around where the motion leads.
   /// \param forces  f_0 that act beside the load, 3 n
   /// \param step  becomes x_free + A^-1 f_0 minus the iterate, 3 n; on held axes the way to their
@@ -262,8 +286,12 @@ public:
   std::span<const double> iterate() const noexcept; ///< 3 n
   /// Whether the open step moves held axes.
   bool moves_held() const noexcept;
-  /// Ends the step at the iterate. \param forces  that act there, 3 n
-  SolidStep end_step(std::span<const double> forces, const Context& context);
+  /// By how much the energy at the end of an open second stage would be more than at the beginning
+  /// of the first one, with what the load has done. Nothing where held axes are moved.
+  StageEnergy stage_energy(const Context& context);
+  /// Ends the step at the iterate. \param forces  that act there, 3 n \param inner  factor of the
+  /// speeds that neither move nor turn the body as a whole
+  SolidStep end_step(std::span<const double> forces, const Context& context, double inner = 1);
 
   /// Whether it was scrambled, and has not found back yet.
   bool recovering() const noexcept;

@@ -102,6 +102,10 @@ double integration_step(World& w, Body& body) {
   const std::optional<double> wish = w.now.settings.timestep;
   if (moves_implicitly(w.now.objects[body.parts[0]]))
     return wish.value_or(implicit_step);
+  if (w.now.settings.order > 1)
+    throw Error("object " + w.now.objects[body.parts[0]].name() +
+                ": moves by explicit steps, which are of first order, expected "
+                "integration=implicit or auto for order=2");
   const double usual = dynamics::safe_step_fraction * body.safe;
   if (!wish)
     return usual;
@@ -196,7 +200,8 @@ Integration chosen_integration(const World& w, const Object& object) {
     return object.integration;
   const double wish = w.now.settings.timestep.value_or(implicit_step);
   const bool asks = object.matter->solid.bulk.has_value();
-  return !is_solid(object) && (asks || model::safe_step(object.model()) * worth_implicit < wish)
+  return !is_solid(object) && (asks || w.now.settings.order > 1 ||
+                               model::safe_step(object.model()) * worth_implicit < wish)
              ? Integration::implicit
              : Integration::semi_implicit;
 }
@@ -328,7 +333,8 @@ void advance_freely(World& w, std::span<Body* const> bodies, double to) {
     context.threads = 1;
   parallel_blocks(w.context, awake.size(), 1, [&](std::size_t k, std::size_t) {
     try {
-      awake[k]->taken = awake[k]->moving->advance(duration, step[k], context, w.now.clock.time);
+      awake[k]->taken = awake[k]->moving->advance(duration, {step[k], w.now.settings.order},
+                                                  context, w.now.clock.time);
     } catch (...) {
       awake[k]->failure = std::current_exception();
     }

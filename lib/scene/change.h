@@ -111,6 +111,7 @@ struct SetGravity {
 };
 struct SetTimestep {
   double dt = 0;
+  int order = 1; ///< of implicit steps, 1 or 2
 };
 /// Starts the two-step method for an elastostatic object.
 struct SetTwoStep {

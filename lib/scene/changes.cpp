@@ -226,10 +226,12 @@ void Rule<SetGravity>::log(const World&, const SetGravity& c, ChangeRow& row) {
 
 void Rule<SetTimestep>::apply(World& w, const SetTimestep& c) {
   w.now.settings.timestep = c.dt;
+  w.now.settings.order = c.order;
 }
 void Rule<SetTimestep>::log(const World&, const SetTimestep& c, ChangeRow& row) {
   row.what = "timestep";
   row.value = c.dt;
+  row.text = c.order == 2 ? "order=2" : "";
 }
 
 void Rule<Emit>::apply(World& w, const Emit& c) {

@@ -48,28 +48,50 @@ std::vector<std::size_t> IslandParts::objects() const {
 
 // ---- bodies
 
-contact::ContactBody& BodyMember::begin(double from, double to, const Context& context) {
-  return body_.moving->begin_contact_step(from, to, context);
+contact::ContactBody& BodyMember::begin(const contact::Interval& step, const Context& context) {
+  return body_.moving->begin_contact_step(step, context);
 }
 
-void BodyMember::end(std::span<const Force> forces, double h, const Context& context) {
+/// Forces on the nodes of a part, by its own numbers.
+std::vector<contact::NodalContactForce>
+BodyMember::forces_on(const Object& part, std::span<const contact::NodalContactForce> all) const {
+  std::vector<contact::NodalContactForce> own;
+  for (contact::NodalContactForce f : all) {
+    if (f.node < part.offset || f.node - part.offset >= part.model().nodes.size())
+      continue;
+    f.node -= static_cast<std::uint32_t>(part.offset);
+    own.push_back(f);
+  }
+  return own;
+}
+
+void BodyMember::end(std::span<const Force> forces, const contact::Interval& step,
+                     const Context& context) {
+  const bool first = step.stage == numeric::Stage::first,
+             second = step.stage == numeric::Stage::second;
   body_.moving->end_contact_step(vertex_sums(forces), clearing_, context);
-  ++body_.taken;
-  const std::vector<contact::NodalContactForce> all =
+  body_.taken += first ? 0 : 1;
+  std::vector<contact::NodalContactForce> all =
       nodal_forces(forces, surface_.node, instrument_of_piece_);
+  const double length = step.to - step.from;
   for (const std::size_t part : body_.parts) {
     Object& object = w_.now.objects[part];
-    object.touching.clear();
-    for (contact::NodalContactForce f : all) {
-      if (f.node < object.offset || f.node - object.offset >= object.model().nodes.size())
-        continue;
-      f.node -= static_cast<std::uint32_t>(object.offset);
-      object.touching.push_back(f);
-      f.force *= h;
-      if (!clearing_)
+    object.touching = forces_on(object, all);
+    if (clearing_)
+      continue;
+    const auto add = [&](std::span<const contact::NodalContactForce> of, double h) {
+      for (contact::NodalContactForce f : of) {
+        f.force *= h;
         object.impulses.push_back(f);
-    }
+      }
+    };
+    add(object.touching, second ? length / numeric::stage_extension : length);
+    if (second) // so long the first stage's forces act, beside its own length
+      add(forces_on(object, first_), length - length / numeric::stage_extension);
   }
+  first_.clear();
+  if (first)
+    first_ = std::move(all);
 }
 
 // ---- elastostatic objects
@@ -124,7 +146,9 @@ void StaticMember::follow_load(double start, double end) {
              acting_at(object, end), stood_shape(w_, object), start, end};
 }
 
-contact::ContactBody& StaticMember::begin(double /*from*/, double to, const Context& /*context*/) {
+contact::ContactBody& StaticMember::begin(const contact::Interval& step,
+                                          const Context& /*context*/) {
+  const double to = step.to;
   Object& object = w_.now.objects[object_];
   if (is_held_altogether(object)) {
     std::vector<Vec3> x;
@@ -205,7 +229,8 @@ contact::ContactBody& StaticMember::begin(double /*from*/, double to, const Cont
   return *body_;
 }
 
-void StaticMember::end(std::span<const Force> forces, double /*h*/, const Context& /*context*/) {
+void StaticMember::end(std::span<const Force> forces, const contact::Interval& /*step*/,
+                       const Context& /*context*/) {
   Object& object = w_.now.objects[object_];
   std::vector<contact::NodalContactForce> touching =
       nodal_forces(forces, surface_.node, instrument_of_piece_);
@@ -250,17 +275,25 @@ void StaticMember::end_part() {
 
 // ---- instruments
 
-contact::ContactBody& InstrumentMember::begin(double from, double to, const Context& /*context*/) {
+contact::ContactBody& InstrumentMember::begin(const contact::Interval& step,
+                                              const Context& /*context*/) {
   const Instrument& i = instrument();
-  target_ = given_ ? *given_ : i.way.at(to);
+  target_ = given_ ? *given_ : i.way.at(step.to);
   double compliance = 0;
   std::vector<contact::VertexForce> last;
   if (i.coupled) {
     hand_ = target_.place;
-    const contact::CouplingStep step(i.coupled->coupling, i.coupled->lag,
-                                     given_ ? duration_ : to - from);
-    compliance = step.compliance;
-    target_.place = hand_ - step.free;
+    Vec3 lag = i.coupled->lag;
+    double duration = given_ ? duration_ : step.to - step.from;
+    if (step.stage == numeric::Stage::second) {
+      duration /= numeric::stage_extension;
+      lag = lag_ + numeric::stage_extension * (lag - lag_);
+    } else {
+      lag_ = lag;
+    }
+    const contact::CouplingStep coupling(i.coupled->coupling, lag, duration);
+    compliance = coupling.compliance;
+    target_.place = hand_ - coupling.free;
     last.push_back({0, i.coupled->force});
   }
   body_ = std::make_unique<contact::InstrumentBody>(surface_.rest, now_, target_, compliance,
@@ -268,7 +301,7 @@ contact::ContactBody& InstrumentMember::begin(double from, double to, const Cont
   return *body_;
 }
 
-void InstrumentMember::end(std::span<const Force> forces, double /*h*/,
+void InstrumentMember::end(std::span<const Force> forces, const contact::Interval& /*step*/,
                            const Context& /*context*/) {
   now_ = target_;
   Instrument& i = instrument();

@@ -106,17 +106,23 @@ public:
   BodyMember(World& w, Body& body, const contact::ModelSurface& surface,
              const std::vector<std::uint32_t>& instrument_of_piece)
       : w_(w), body_(body), surface_(surface), instrument_of_piece_(instrument_of_piece) {}
-  contact::ContactBody& begin(double from, double to, const Context& context) override;
-  void end(std::span<const Force> forces, double h, const Context& context) override;
+  contact::ContactBody& begin(const contact::Interval& step, const Context& context) override;
+  void end(std::span<const Force> forces, const contact::Interval& step,
+           const Context& context) override;
+  bool has_first_stage() const override { return body_.moving->has_first_stage(); }
   /// Whether instruments jump in these steps. The velocity that they cause is then removed.
   void set_clearing(bool clearing) { clearing_ = clearing; }
 
 private:
+  std::vector<contact::NodalContactForce>
+  forces_on(const Object& part, std::span<const contact::NodalContactForce> all) const;
+
   World& w_;
   Body& body_;
   const contact::ModelSurface& surface_;
   const std::vector<std::uint32_t>& instrument_of_piece_;
   bool clearing_ = false;
+  std::vector<contact::NodalContactForce> first_; ///< of the last first stage
 };
 
 /// An elastostatic object in an island.
@@ -124,8 +130,9 @@ class StaticMember final : public contact::IslandMember {
 public:
   StaticMember(World& w, std::size_t object, const contact::ModelSurface& surface,
                const std::vector<std::uint32_t>& instrument_of_piece);
-  contact::ContactBody& begin(double from, double to, const Context& context) override;
-  void end(std::span<const Force> forces, double h, const Context& context) override;
+  contact::ContactBody& begin(const contact::Interval& step, const Context& context) override;
+  void end(std::span<const Force> forces, const contact::Interval& step,
+           const Context& context) override;
   /// Replaces the load at the end of the step.
   void set_load(contact::Load load) { given_ = std::move(load); }
   /// Replaces the time at that end, for what relaxes.
@@ -173,8 +180,9 @@ public:
   InstrumentMember(World& w, std::size_t instrument, const contact::BodySurface& surface,
                    const contact::Pose& start)
       : w_(w), instrument_(instrument), surface_(surface), now_(start) {}
-  contact::ContactBody& begin(double from, double to, const Context& context) override;
-  void end(std::span<const Force> forces, double h, const Context& context) override;
+  contact::ContactBody& begin(const contact::Interval& step, const Context& context) override;
+  void end(std::span<const Force> forces, const contact::Interval& step,
+           const Context& context) override;
   /// Sets the pose at the end of the next step, instead of that of the instrument's path.
   /// \param duration  of the step, for a coupling
   void set_target(const contact::Pose& target, double duration) {
@@ -195,6 +203,7 @@ private:
   const contact::BodySurface& surface_;
   contact::Pose now_, target_;
   Vec3 hand_; ///< at the end of the step
+  Vec3 lag_;  ///< of a coupling where a first stage began
   std::optional<contact::Pose> given_;
   double duration_ = 0;
   std::unique_ptr<contact::InstrumentBody> body_;

@@ -263,7 +263,7 @@ void advance_island(World& w, IslandParts& island, double to) {
       const double begin = start + taken * h;
       ++taken;
       const double end = taken == count ? to : start + taken * h;
-      cache.motion->advance(members.all, begin, end, parts, w.context);
+      cache.motion->advance(members.all, begin, end, parts, w.context, w.now.settings.order);
       if (end < to && has_come_to_rest(w, island, end, to)) {
         sleep_on(w, island, to - end);
         break;

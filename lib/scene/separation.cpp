@@ -37,10 +37,11 @@ public:
                 double typical_force)
       : at_(std::move(from)), to_(std::move(to)), held_(std::move(held)), typical_(typical_force) {}
 
-  ContactBody& begin(double /*from*/, double /*to*/, const Context& /*context*/) override {
+  ContactBody& begin(const contact::Interval& /*step*/, const Context& /*context*/) override {
     return *this;
   }
-  void end(std::span<const Force> /*forces*/, double /*h*/, const Context& /*context*/) override {}
+  void end(std::span<const Force> /*forces*/, const contact::Interval& /*step*/,
+           const Context& /*context*/) override {}
 
   std::size_t vertex_count() const override { return at_.size(); }
   void positions(std::span<Vec3> x) override { std::ranges::copy(at_, x.begin()); }

@@ -150,6 +150,7 @@ struct Emits {
 /// Settings of the scene as a whole, made by changes.
 struct SceneSettings {
   std::optional<double> timestep; ///< requested integration step, s
+  int order = 1;                  ///< of implicit steps
   Emits emits;
 };
 

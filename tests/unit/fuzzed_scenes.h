@@ -328,7 +328,8 @@ private:
              nodes(*other.model) + " " + text::number_text(real(10, 5e4));
     case 8:
       return one_in(3)   ? "gravity " + triple(1e4)
-             : one_in(4) ? "timestep " + text::number_text(of(std::vector{1e-3, 2e-4, 1e-300}))
+             : one_in(4) ? "timestep " + text::number_text(of(std::vector{1e-3, 2e-4, 1e-300})) +
+                               (contacts_() % 4 == 0 ? " order=2" : "")
                          : two_step(o);
     default:
       return load();

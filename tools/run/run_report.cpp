@@ -62,6 +62,10 @@ void report_scene(cli::Run& run, const SceneRun& scene, const StepLatency& laten
     stats.set("solid_factors", solids.factors);
     stats.set("solid_unfinished", solids.unfinished);
     stats.set("solid_limited", solids.limited);
+    if (const int order = scene.simulation().settings().order; order > 1) {
+      stats.set("solid_order", order);
+      stats.set("contact_first_order", steps.contact.first_order);
+    }
     stats.seconds("solid_motion", solids.seconds);
   }
   const contact::StepReport& contact = steps.contact;
