@@ -58,7 +58,7 @@ private:
     return row_of_[front * front_of_.size() + group];
   }
   void order_groups(std::span<const std::uint8_t> coupled);
-  void add_update(std::size_t front, std::span<double> update);
+  void add_update(std::size_t from, std::span<double> update);
 
   std::vector<std::uint32_t> group_, local_;         ///< of each unknown, and its place there
   std::vector<std::vector<std::uint32_t>> unknowns_; ///< by group

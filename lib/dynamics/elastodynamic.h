@@ -39,7 +39,7 @@ public:
   explicit Elastodynamic(const model::Model& model);
 
   void set_load(const contact::Load& load, double time = 0) override;
-  std::uint64_t advance(double duration, const TimeSteps& steps, const Context& context,
+  std::uint64_t advance(double duration, const TimeSteps& of, const Context& context,
                         double start = 0) override;
 
   /// The object is at rest if its velocity is zero, and its acceleration times the square of the

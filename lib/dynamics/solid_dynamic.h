@@ -41,7 +41,7 @@ public:
                const Context& context);
 
   void set_load(const contact::Load& load, double time) override;
-  std::uint64_t advance(double duration, const TimeSteps& steps, const Context& context,
+  std::uint64_t advance(double duration, const TimeSteps& of, const Context& context,
                         double start = 0) override;
 
   /// The object is at rest if two steps in a row moved no node by more than 1e-9 of the largest
