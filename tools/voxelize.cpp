@@ -1,10 +1,11 @@
-// voxelize: closed mesh, labels or scan -> volume.
+// voxelize: closed mesh, labels, scan or contours -> volume.
 
 #include "formats/mesh/mesh_file.h"
 #include "tools/cli/cli.h"
 #include "tools/cli/filling_rule.h"
 #include "tools/cli/space_option.h"
 #include "tools/cli/transform_option.h"
+#include "tools/volume/voxelize_contours.h"
 #include "tools/volume/voxelize_labels.h"
 #include "tools/volume/voxelize_mesh.h"
 #include "tools/volume/voxelize_scan.h"
@@ -16,18 +17,21 @@ namespace {
 struct Arguments {
   cli::MeshToVoxelize mesh;
   std::string on_open = "error", rule = "parity", labels, threshold, space;
+  bool contours = false;
 };
 
 /// What says how a mesh is read and filled.
 void refuse_mesh_options(const cli::Program& p, const std::string& asked) {
   for (const std::string name :
        {"--rule", "--antialias", "--on-open", "--unit", "--weld", "--format", "--transform"})
-    if (p.given(name))
+    if (p.given(name) && !(name == "--unit" && asked == "--contours"))
       throw UsageError(asked + ": " + name + " is for meshes, expected no " + name);
 }
 
 void complete(const cli::Program& p, Arguments& a) {
   const bool own_lattice = a.mesh.dim || !a.mesh.like.empty();
+  if (int{!a.threshold.empty()} + int{!a.labels.empty()} + int{a.contours} > 1 && a.contours)
+    throw UsageError("--contours: the input is either contours, labels or a scan, expected one");
   if (!a.threshold.empty()) {
     cli::check_thresholds(a.threshold, !a.labels.empty(), own_lattice);
     return refuse_mesh_options(p, "--threshold");
@@ -35,6 +39,11 @@ void complete(const cli::Program& p, Arguments& a) {
   if (!a.labels.empty()) {
     cli::check_labels(a.labels, a.mesh.voxel.has_value(), own_lattice);
     return refuse_mesh_options(p, "--label");
+  }
+  if (a.contours) {
+    if (!a.mesh.voxel || own_lattice)
+      throw UsageError("--contours: expected --voxel S, the edge of the voxels in mm");
+    return refuse_mesh_options(p, "--contours");
   }
   if (int{a.mesh.voxel.has_value()} + int{a.mesh.dim.has_value()} + int{!a.mesh.like.empty()} != 1)
     throw UsageError("expected exactly one of --voxel, --dim and --like");
@@ -52,7 +61,8 @@ void complete(const cli::Program& p, Arguments& a) {
 } // namespace
 
 int main(int argc, char** argv) {
-  cli::Program p("voxelize", "Turns a closed mesh, exactly, labels or a scan into a volume.");
+  cli::Program p("voxelize",
+                 "Turns a closed mesh, exactly, labels, a scan or contours into a volume.");
   Arguments a;
   p.option("--voxel", a.mesh.voxel, "S", "edge of a voxel in mm, centres at multiples of S")
       .positive();
@@ -65,6 +75,8 @@ int main(int argc, char** argv) {
       .such_as({"list"});
   p.option("--threshold", a.threshold, "LOW[,HIGH]",
            "the input is a scan (same formats): convert grey values above LOW and below HIGH");
+  p.flag("--contours", a.contours,
+         "the input are closed contours in parallel slices, as text: x y z, blank lines between");
   p.option("--rule", a.rule, "RULE", "when a point is inside: parity, winding, zbuffer")
       .one_of({"parity", "winding", "zbuffer"});
   p.option("--antialias", a.mesh.antialias, "FILTER",
@@ -88,6 +100,8 @@ int main(int argc, char** argv) {
     if (!a.threshold.empty())
       cli::voxelize_scan(run, a.mesh.name, cli::thresholds_from_text(a.threshold), a.mesh.voxel,
                          a.mesh.output);
+    else if (a.contours)
+      cli::voxelize_contours(run, a.mesh.name, a.mesh.unit, *a.mesh.voxel, a.mesh.output);
     else if (a.labels.empty())
       cli::voxelize_mesh(run, a.mesh);
     else if (a.labels == "list")
