@@ -189,8 +189,8 @@ void add_slope(const std::vector<Slice>& slices, std::size_t k, double factor, s
   const bool before = k > 0, behind = k + 1 < slices.size();
   const double h0 = before ? slices[k].height - slices[k - 1].height : 0;
   const double h1 = behind ? slices[k + 1].height - slices[k].height : 0;
-  // Of the parabola through three slices: the mean of both differences, the shorter interval
-  // weighing more.
+  // Slope of the parabola through three slices: weighted mean of both differences, with the larger
+  // weight for the shorter interval.
   const double w0 = before ? (behind ? h1 / (h0 + h1) : 1) : 0, w1 = 1 - w0;
   if (before) {
     add(k, w0 / h0);

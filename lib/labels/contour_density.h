@@ -42,9 +42,9 @@ struct ContourDensityReport {
 /// Time: pixels of all slices times the few contour edges that may be nearest, and all voxels of
 /// the box. Memory: four bytes for each pixel of each slice, beside the result.
 /// \pre coordinates are finite, voxel > 0, each contour has three points or more
-/// \throw Error if a contour does not lie in a plane across an axis, if the planes are not all
-/// across one axis, if there are fewer than two slices, if an index would leave ±2^30, if
-/// context.max_memory is not enough
+/// \throw Error if a contour does not lie in a plane across an axis, or not across the axis of the
+/// others; if there are fewer than two slices
+/// \throw Error if an index would leave ±2^30, or context.max_memory is not enough
 volume::Grid contour_density(const Context& context, std::span<const Contour> contours,
                              double voxel, ContourDensityReport* report = nullptr);
 
