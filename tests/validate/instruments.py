@@ -98,6 +98,12 @@ def near_points(corners, a, b):
             w = np.zeros((n, 3))
             w[:, i] = 1
             add(every, w, a + s[:, None] * (b - a))
+        for end in (a, b):  # ends of the segment and edges: where the nearest points of both edges are at such an end
+            for i, j in ((0, 1), (1, 2), (2, 0)):
+                s = on_segment(np.broadcast_to(end, (n, 3)), corners[:, i], corners[:, j])
+                w = np.zeros((n, 3))
+                w[:, i], w[:, j] = 1 - s, s
+                add(every, w, end)
         for i, j in ((0, 1), (1, 2), (2, 0)):  # edges and the segment
             s, t = between_segments(np.broadcast_to(a, (n, 3)), np.broadcast_to(b, (n, 3)), corners[:, i], corners[:, j])
             there = ~np.isnan(s)
