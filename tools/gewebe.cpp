@@ -4,6 +4,7 @@
 #include "formats/stream/stream.h"
 #include "text/nearest_word.h"
 #include "tools/cli/messages.h"
+#include "tools/cli/starter_texts.h"
 #include "tools/cli/tool_list.h"
 #include "tools/cli/version.h"
 #include "tools/plot/plot_command.h"
@@ -26,20 +27,6 @@ using namespace gewebe;
 namespace {
 
 namespace fs = std::filesystem;
-
-constexpr std::string_view usage = R"(Starts the programs of Gewebe.
-Usage: gewebe PROGRAM [ARGUMENT...]
-       gewebe plot --y NAME,... [OPTION...] [TABLE]
-       gewebe help [PAGE]
-       gewebe --list | --makefile | --help | --version
-
-Options:
-  --list      the programs, and what they do
-  --makefile  a Makefile from a scan, mesh or particles to a solid, a run and a film
-  -h,--help   this text
-  --version   version, commit, libraries, kernels
-
-)";
 
 /// Becomes that program. \throw Error if it can't be run
 [[noreturn]] void become(const std::string& path, std::vector<std::string> words) {
@@ -112,14 +99,17 @@ void work(const std::vector<std::string>& words) {
   if (words.size() > 2)
     throw UsageError("unexpected '" + words[2] + "' after " + word + ", see gewebe --help");
   if (word == "-h" || word == "--help" || word == "help")
-    return write_text(std::string(usage) + cli::tool_list());
+    return write_text(cli::starter_help());
+  if (word == "--help-json")
+    return write_text(cli::starter_help_json());
   if (word == "--list")
     return write_text(cli::tool_list());
   if (word == "--makefile")
     return write_text(gewebe_standard_makefile);
   if (word == "--version")
     return write_text(cli::version_text("gewebe"));
-  std::vector<std::string> known{"plot", "help", "--help", "--list", "--makefile", "--version"};
+  std::vector<std::string> known{"plot",   "help",       "--help",   "--help-json",
+                                 "--list", "--makefile", "--version"};
   std::ranges::copy(cli::tool_names(), std::back_inserter(known));
   throw UsageError("no program '" + word + "'" + text::suggestion(word, known) +
                    ", see gewebe --list");

@@ -54,6 +54,7 @@ test_bash() {
   expect_proposed '--place' gewebe mc-opt --pl
   expect_proposed 'corner mean' gewebe mc-opt --place ''
   expect_proposed 'voxelize' gewebe help v
+  expect_proposed '--size --stats' gewebe plot --s
   # That it can fail.
   ! (expect_proposed 'mean' mc-opt --place '') >/dev/null || fail 'another proposal passes'
 }
@@ -92,6 +93,7 @@ test_zsh() {
   for_line 'csg su' subtract
   for_line 'gewebe mc-opt --place ' 'corner  mean'
   for_line 'gewebe ' 'csg             -- '
+  for_line 'gewebe plot --to ' 'ascii  svg'
   for_line 'mc-opt --' '--self-intersections  -- let --stats count'
   # That it can fail: another program's words.
   ! (for_line 'csg --pl' '--place=') >/dev/null || fail 'csg has --place'
@@ -112,4 +114,5 @@ test_fish() {
   [[ $(by_fish 'csg su') == *subtract* ]] || fail 'no operation' "$(by_fish 'csg su')"
   [[ $(by_fish 'gewebe meta') == metaball2vol* ]] || fail 'no program' "$(by_fish 'gewebe meta')"
   [[ $(by_fish 'gewebe mc-opt --self') == --self-intersections* ]] || fail 'nothing behind gewebe' "$(by_fish 'gewebe mc-opt --self')"
+  [[ $(by_fish 'gewebe plot --ti') == --title* ]] || fail 'no option of plot' "$(by_fish 'gewebe plot --ti')"
 }

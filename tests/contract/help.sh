@@ -43,6 +43,11 @@ test_json_says_what_help_says() {
     [[ ! $difference ]] || fail "$tool --help-json differs from --help:" "$difference"
     [[ $(python3 -c 'import json; print(json.load(open("help.json"))["program"])') == "$tool" ]] || fail "not $tool"
   done
+  # The program that starts the others has options alone.
+  gewebe --help >starter.txt
+  gewebe --help-json >starter.json
+  difference=$(compare_json starter.txt starter.json) || fail 'gewebe --help-json is not understood'
+  [[ ! $difference ]] || fail 'gewebe --help-json differs from --help:' "$difference"
   # Another option, default or value is seen.
   sed 's/"--threads"/"--thread"/' help.json >other.json
   [[ $(compare_json help.txt other.json) ]] || fail 'another option passes'
